@@ -1,4 +1,4 @@
-//! Accelerations of one state after the other: the system `M a = g - c` of a sparse mass matrix is solved within the program that computes it.
+//! Accelerations at one state after another: a program both computes and solves the sparse system `M a = g - c`.
 
 use super::elimination::{Balance, eliminate};
 use super::linearization::{Linearized, Rate, SparseRows};
@@ -13,20 +13,21 @@ use alloc::vec::Vec;
 use core::fmt::Debug;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Number of products of an elimination that is always worth recording: it takes less time than a call of a solver.
+/// Eliminations with at most this many products are always recorded: they take less time than a call of a solver.
 pub(super) const SMALL: usize = 60;
 
-/// Largest number of coordinates of a Lagrangian whose linearization is recorded as one program. Compared with programs of the parts, in
-/// three runs of `cargo bench --bench hessians -- linearization`: 0.4 to 0.5 times the time at two coordinates, 0.4 to 1.4 at four.
+/// Largest number of coordinates for which the whole linearization is recorded as one program. Compared with separate programs for its
+/// parts, in three runs of `cargo bench --bench hessians -- linearization`, it takes 0.4 to 0.5 times as long for two coordinates and 0.4
+/// to 1.4 times for four.
 const WHOLE: usize = 4;
 
-/// Records the equations of motion of a model, at a state and with parameters that are being recorded.
+/// Records the equations of motion of a model for a traced state and traced parameters.
 pub(super) trait RecordMotion<S>: Debug + Send + Sync {
-    /// The equations; `None` if they are too large.
+    /// Records the equations; returns `None` if they are too large.
     fn record<'t>(&self, state: &[Tracer<'t, S>], parameters: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>>;
 
-    /// Derivatives by the state of their right sides minus their left sides, with the accelerations and the multipliers held; `x` holds
-    /// `q`, `v`, `a`, `lambda`. `None` if they are too large, or not known.
+    /// Records the derivatives of right side minus left side by the state, at fixed accelerations and multipliers; `x` contains `q`, `v`,
+    /// `a`, `lambda`. Returns `None` if they are too large or unknown.
     fn record_slopes<'t>(
         &self,
         _x: &[Tracer<'t, S>],
@@ -41,13 +42,13 @@ pub(super) trait RecordMotion<S>: Debug + Send + Sync {
     }
 }
 
-/// A program of accelerations, in which the elimination with the pattern of the mass matrix is recorded too.
+/// A program that computes the accelerations, including the elimination along the pattern of the mass matrix.
 ///
-/// A positive definite matrix needs no search for pivots, even when constraints border it. Each state shows whether it is positive
-/// definite: by the pivots, which follow the accelerations among the outputs.
+/// A positive definite matrix needs no pivoting, even when it is bordered by constraints. Whether it is positive definite at a state shows
+/// in the pivots, which follow the accelerations among the outputs.
 #[derive(Clone, Debug)]
 pub struct Solved<'a, S> {
-    /// The motion that was recorded, for a model that adds to these equations.
+    /// The recorded equations of motion, for models that add terms to them.
     motion: Arc<dyn RecordMotion<S>>,
     program: Arc<Program<S>>,
     parameters: Vec<S>,
@@ -55,32 +56,32 @@ pub struct Solved<'a, S> {
     pivots: usize,
     /// The program of the linearization, recorded on first use.
     linearized: Arc<OnceLock<Option<Linearized<S>>>>,
-    /// Once it is raised, every call fails.
+    /// When this flag is raised, every call fails.
     flag: Option<&'a AtomicBool>,
 }
 
 impl<'a, S: Scalar> Solved<'a, S> {
-    /// These accelerations until a flag is raised.
+    /// Makes these accelerations fail once a flag is raised.
     pub(super) fn until(self, flag: &'a AtomicBool) -> Self {
         Self { flag: Some(flag), ..self }
     }
 
-    /// These accelerations until the flag of another one is raised.
+    /// Makes these accelerations fail once the flag of another one is raised.
     pub(super) fn with_flag_of(self, other: Self) -> Self {
         Self { flag: other.flag, ..self }
     }
 
-    /// The motion that was recorded, and the values of its parameters.
+    /// Returns the recorded equations of motion and the values of their parameters.
     pub(super) fn motion(&self) -> (&Arc<dyn RecordMotion<S>>, &[S]) {
         (&self.motion, &self.parameters)
     }
 
-    /// `true` once the flag is raised.
+    /// Returns `true` once the flag is raised.
     pub(super) fn is_interrupted(&self) -> bool {
         self.flag.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// The program of the linearization; `None` if its parts are faster, or are the only way.
+    /// Returns the program of the linearization; `None` if separate programs are faster, or if it cannot be recorded.
     pub(super) fn linearized(&self) -> Option<Linearized<S>> {
         let n = self.program.inputs() / 2;
         self.linearized.get_or_init(|| Linearized::record(self.motion.as_ref(), n, &self.parameters)).clone()
@@ -88,7 +89,7 @@ impl<'a, S: Scalar> Solved<'a, S> {
 }
 
 impl<S: Scalar> Solved<'static, S> {
-    /// Records the accelerations of `n` coordinates by an elimination of at most `most` products; `None` if it needs more.
+    /// Records the accelerations of `n` coordinates with an elimination of at most `most` products; returns `None` if it needs more.
     pub(super) fn record(motion: Arc<dyn RecordMotion<S>>, n: usize, parameters: &[S], most: usize) -> Option<Self> {
         let mut pivots = 0;
         let program = Program::record_within(ROWS, (2 * n, parameters.len()), |x, p| {
@@ -96,7 +97,7 @@ impl<S: Scalar> Solved<'static, S> {
             let is_diagonal = balance.lower.iter().all(|row| row.len() == 1);
             let (mut outputs, guards) = eliminate(balance, most)?;
             outputs.truncate(n);
-            // A diagonal matrix is solved whatever its signs.
+            // A diagonal matrix can be solved whatever the signs of its elements.
             if !is_diagonal {
                 pivots = guards.len();
                 outputs.extend(guards.into_iter().flatten());
@@ -107,14 +108,14 @@ impl<S: Scalar> Solved<'static, S> {
         Some(Self { motion, program, parameters, pivots, linearized: Arc::new(OnceLock::new()), flag: None })
     }
 
-    /// Records the accelerations of a Lagrangian from the program of its value; `None` if a dense solver is faster.
+    /// Records the accelerations of a Lagrangian from the program of its value; returns `None` if a dense solver is faster.
     pub(super) fn of_value(value: &Program<S>, parameters: &[S]) -> Option<Self> {
         let (n, most) = (value.inputs() / 2, SMALL.max(value.lane_operations()));
         Self::record(Arc::new(Value(value.clone())), n, parameters, most)
     }
 }
 
-/// The equations of a Lagrangian from the program of its value.
+/// The equations of motion of a Lagrangian, from the program of its value.
 #[derive(Debug)]
 struct Value<S>(Program<S>);
 
@@ -138,7 +139,7 @@ impl<S: Scalar> RecordMotion<S> for Value<S> {
     }
 }
 
-/// `true` if every pivot of an elimination is positive, and not much smaller than its original diagonal element.
+/// Returns `true` if every pivot of an elimination is positive and not much smaller than the original diagonal element.
 pub(super) fn are_safe<S: Scalar>(guards: &[S]) -> bool {
     let (floor, zero) = (S::of_f64(SMALL_PIVOT), <S as Real>::zero());
     let mut safe = true;
@@ -148,10 +149,10 @@ pub(super) fn are_safe<S: Scalar>(guards: &[S]) -> bool {
     safe
 }
 
-/// The accelerations of a model, state after state or in batches, with its own buffers, for use in a solver.
+/// Computes the accelerations of a model, state after state or in batches, with preallocated buffers, for use in a solver.
 ///
-/// Nothing but the accelerations is stored, and nothing is allocated after the first call. A sparse mass matrix is eliminated along its
-/// pattern, a diagonal one is divided by, and its constant parts are computed in advance.
+/// Only the accelerations are stored, and nothing is allocated after the first call. A sparse mass matrix is eliminated along its pattern,
+/// a diagonal one by division, and its constant parts are computed in advance.
 ///
 /// ```
 /// use lnn::lagrangian::{Accelerations, Lagrangian, Mechanics, MechanicsError};
@@ -184,7 +185,7 @@ pub struct Accelerations<'a, S> {
 }
 
 impl<'a, S: Scalar> Accelerations<'a, S> {
-    /// Buffers for a model.
+    /// Allocates the buffers for a model.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
         let solved = model.solved().map(|solved| {
             let replay = Replay::new(Arc::clone(&solved.program));
@@ -193,7 +194,7 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
         Self { model, solved, pivots: Vec::new(), terms: Terms::default() }
     }
 
-    /// The accelerations `a` of states `q`, `v`, all `(batch, n)` in physical units.
+    /// Computes the accelerations `a` at states `q`, `v`, all `(batch, n)` in physical units.
     ///
     /// # Errors
     /// Those of [`EulerLagrange::terms`]; a wrong length of `a`.
@@ -207,7 +208,7 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
         if self.is_solved(q, v, a) {
             return Ok(());
         }
-        // Searches for pivots, and finds a reason for every row that fails.
+        // The general solver uses pivoting and reports a reason for every row that fails.
         let outcome = self.model.terms(q, v, Request::ACCELERATION, &mut self.terms);
         let found = self.terms.acceleration.len();
         if found == a.len() {
@@ -218,7 +219,7 @@ impl<'a, S: Scalar> Accelerations<'a, S> {
         outcome
     }
 
-    /// Fills the accelerations by the program; `false` if there is none, or a state needs closer examination.
+    /// Computes the accelerations with the program; returns `false` if there is no program or a state needs the general solver.
     pub(super) fn is_solved(&mut self, q: &[S], v: &[S], a: &mut [S]) -> bool {
         let Some((solved, replay)) = &mut self.solved else { return false };
         let n = self.model.coordinates();
@@ -236,7 +237,7 @@ mod tests {
     use super::*;
     use crate::lagrangian::{Lagrangian, Mechanics};
 
-    /// Masses in a line that also pull their neighbours' velocities: a tridiagonal mass matrix that depends on the place.
+    /// Masses in a line whose velocities are coupled to their neighbours': a tridiagonal mass matrix that depends on the position.
     struct Line {
         n: usize,
         sign: f64,

@@ -27,24 +27,24 @@ use alloc::vec::Vec;
 use num_traits::Float as _;
 use rand::Rng;
 
-/// Why a system could not be built.
+/// The reason why a system could not be built.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SystemError {
-    /// No system of this name.
+    /// There is no system with this name.
     UnknownSystem {
         /// The requested name.
         name: String,
-        /// Names there are.
+        /// All known names.
         known: Vec<String>,
     },
-    /// No parameter of this symbol.
+    /// The system has no parameter with this symbol.
     UnknownParameter {
         /// The system.
         system: String,
         /// The symbol given.
         symbol: String,
-        /// Symbols there are.
+        /// All symbols of the system.
         known: Vec<String>,
     },
     /// A parameter given twice.
@@ -63,12 +63,12 @@ pub enum SystemError {
         /// The text given.
         found: String,
     },
-    /// A dependence on the time, where states are needed.
+    /// The system depends on the time, but the call needs a system whose state alone determines the motion.
     Timed {
         /// The system.
         system: String,
     },
-    /// Constraints that contradict each other or leave no motion.
+    /// The constraints contradict each other or leave no motion.
     Constraints {
         /// The system.
         system: String,
@@ -124,29 +124,29 @@ pub struct SystemInstance<S> {
     pub parameters: Vec<S>,
 }
 
-/// A function of the Lagrangian of a system, generic in the type of the Lagrangian.
+/// A function that accepts the Lagrangian of any system, generic in its type.
 pub trait LagrangianVisitor {
     /// Result of the visit.
     type Output;
 
-    /// Takes the Lagrangian; its parameters are [`SystemInstance::parameters`].
+    /// Receives the Lagrangian; its parameters are [`SystemInstance::parameters`].
     fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output;
 }
 
-/// All systems whose coordinates are free; `constrained_systems` are the others.
+/// Returns all systems without constraints; `constrained_systems` returns the others.
 pub fn systems() -> &'static [System] {
     SYSTEMS
 }
 
-/// The system with a name.
+/// Returns the system with a name.
 ///
 /// # Errors
-/// [`SystemError::UnknownSystem`] with the nearest name.
+/// [`SystemError::UnknownSystem`], which suggests the nearest name.
 pub fn find(name: &str) -> Result<&'static System, SystemError> {
     SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
 }
 
-/// The system of a name, one under constraints as well.
+/// Returns the system with a name, including those with constraints.
 ///
 /// # Errors
 /// As [`find`].
@@ -161,7 +161,7 @@ pub fn resolve(name: &str) -> Result<Cow<'static, System>, SystemError> {
 }
 
 impl<S: Scalar> SystemInstance<S> {
-    /// As [`build`](super::build).
+    /// Builds the model, as [`build`](super::build) does.
     ///
     /// # Errors
     /// [`SystemError::UnknownSystem`] if the description is not in the catalogue or the scalar is not one of `f32`, `f64` and
@@ -170,7 +170,7 @@ impl<S: Scalar> SystemInstance<S> {
         let count = self.inputs().count();
         self.build_with(Box::new((count, |_: S, values: &mut [S]| values.fill(<S as Real>::zero()))))
     }
-    /// As [`build`](Self::build), with values for the inputs, which are otherwise 0.
+    /// Builds the model as [`build`](Self::build) does, with values for the inputs, which are otherwise 0.
     ///
     /// # Errors
     /// Those of [`build`](Self::build).
@@ -182,7 +182,7 @@ impl<S: Scalar> SystemInstance<S> {
         }
         self.constrain(if self.is_timed() { Box::new(InTime::with_inputs(model, inputs)) } else { model })
     }
-    /// `true` if its forces depend on measured inputs.
+    /// Returns `true` if the forces depend on measured inputs.
     pub fn has_inputs(&self) -> bool {
         self.system.description().is_some_and(|own| own.inputs.len() > own.marks())
     }
@@ -190,28 +190,29 @@ impl<S: Scalar> SystemInstance<S> {
     pub fn inputs(&self) -> impl Iterator<Item = &str> {
         self.system.description().into_iter().flat_map(|own| own.inputs.keys().map(String::as_str))
     }
-    /// Refuses a system whose states alone have no accelerations.
+    /// Rejects a system whose accelerations depend on more than the state.
     ///
     /// # Errors
     /// [`SystemError::Timed`].
     pub fn require_states(&self) -> Result<(), SystemError> {
         if self.is_timed() { Err(SystemError::Timed { system: self.system.name.to_string() }) } else { Ok(()) }
     }
-    /// `true` if the Lagrangian or forces of its description depend on the time or on inputs, which are then their last coordinates.
+    /// Returns `true` if the Lagrangian or the forces of the description depend on the time or on inputs, which are then the last
+    /// coordinates.
     pub fn is_timed(&self) -> bool {
         self.system.described.as_ref().is_some_and(|described| described.is_timed())
     }
-    /// The generalized forces of a system by its description; their parameters are the Lagrangian's.
+    /// Returns the generalized forces of the description; they take the same parameters as the Lagrangian.
     #[doc(hidden)]
     pub fn forces(&self) -> Option<&FormulaForces> {
         self.system.described.as_ref()?.forces.as_ref()
     }
-    /// The events of a system by its description, in the order of their names.
+    /// Returns the events of the description, sorted by name.
     pub fn events(&self) -> Vec<GivenEvent<S>> {
         let events = self.system.described.as_ref().map_or(&[][..], |described| &described.events);
         events.iter().map(|event| GivenEvent::new(event.clone(), self.parameters.clone())).collect()
     }
-    /// Adds the friction to a model of its Lagrangian; uses recursion if both are those of a chain of links.
+    /// Adds friction to the model of the Lagrangian; for a chain of links, uses the recursive algorithms.
     pub(super) fn with_friction(&self, free: Box<dyn EulerLagrange<S>>) -> Box<dyn EulerLagrange<S>> {
         let model = match self.friction() {
             None => free,
@@ -219,16 +220,17 @@ impl<S: Scalar> SystemInstance<S> {
             Some((friction, true)) => Box::new(WithForces::vanishing(free, friction)),
         };
         let chain = self.system.described.as_ref().and_then(|described| described.chain.as_ref());
-        // The rows of a chain are numbers of double precision.
+        // The recursion stores the geometry of a chain in double precision.
         match chain.filter(|_| S::epsilon().to_f64() >= f64::EPSILON && !self.is_timed()) {
             Some(shape) => Box::new(Recursive::new(model, shape, &self.parameters)),
             None => model,
         }
     }
-    /// A model of the same coordinates, such as a learned one, under the constraints of the system; unchanged if there are none.
+    /// Applies the constraints of the system to a model of the same coordinates, such as a learned one; without constraints the model is
+    /// unchanged.
     ///
     /// # Errors
-    /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion, or a model of other coordinates.
+    /// [`SystemError::Constraints`] if the constraints contradict each other or leave no motion, or if the model has other coordinates.
     #[doc(hidden)]
     pub fn constrain<'a>(
         &self,
@@ -247,15 +249,15 @@ impl<S: Scalar> SystemInstance<S> {
         let (q, v) = self.anywhere();
         Ok(Box::new(model.independent(&q, &v).map_err(wrong)?))
     }
-    /// The constraints of a system by its description.
+    /// Returns the constraints of the description.
     #[doc(hidden)]
     pub fn constraints(&self) -> Option<&ExpressionConstraints> {
         self.system.described.as_ref()?.constraints.as_ref()
     }
-    /// Indices of the active constraints; redundant ones are left out.
+    /// Returns the indices of the active constraints, without redundant ones.
     ///
     /// # Errors
-    /// [`SystemError::Constraints`] for constraints that contradict each other or leave no motion.
+    /// [`SystemError::Constraints`] if the constraints contradict each other or leave no motion.
     pub fn acting_constraints(&self) -> Result<Vec<usize>, SystemError> {
         use super::Constraints;
         let Some(constraints) = self.constraints() else { return Ok(Vec::new()) };
@@ -264,15 +266,15 @@ impl<S: Scalar> SystemInstance<S> {
         let all = constraints.names().into_iter().enumerate();
         Ok(all.filter(|(_, name)| acting.contains(name)).map(|(row, _)| row).collect())
     }
-    /// The dissipation function of a system by its description; its parameters are the Lagrangian's.
+    /// Returns the dissipation function of the description; it takes the same parameters as the Lagrangian.
     pub fn dissipation(&self) -> Option<&ExpressionLagrangian> {
         self.system.described.as_ref()?.dissipation.as_ref()
     }
-    /// Friction with the values of the parameters, and whether these make it vanish.
+    /// Returns the friction with the values of its parameters, and `true` if it is zero for these values.
     fn friction(&self) -> Option<(Friction<S>, bool)> {
         let (function, mut vanishes) = (self.dissipation()?, false);
         let n = function.coordinates();
-        // Products with a constant 0 are 0 for a tracer.
+        // For a tracer, a product with a constant 0 is 0.
         let _ = tape::Program::<S>::record(2 * n, 0, |x, _| {
             let values: Vec<_> = self.parameters.iter().map(|value| tape::Tracer::constant(*value)).collect();
             let lost = function.lagrangian(&values, &x[..n], &x[n..]);
@@ -282,7 +284,7 @@ impl<S: Scalar> SystemInstance<S> {
         let parameters = self.parameters.clone();
         Some((Friction { function: function.clone(), parameters }, vanishes))
     }
-    /// States within the bounds of the validation, at which constraints are examined.
+    /// Returns states within the validation bounds, at which the constraints are examined.
     fn anywhere(&self) -> (Vec<S>, Vec<S>) {
         const STATES: usize = 24;
         let (bounds, mut rng) = (self.system.validation(self.coordinates), RngStream::Region.generator(0));
@@ -292,8 +294,8 @@ impl<S: Scalar> SystemInstance<S> {
         };
         (draw(&bounds.positions), draw(&bounds.velocities))
     }
-    /// Shows the Lagrangian to a visitor, with the time as its last coordinate if the system depends on it; `None` if the description is
-    /// not in the catalogue, and for a system with constraints, whose Lagrangian alone does not determine its motion.
+    /// Passes the Lagrangian to a visitor, with the time as its last coordinate if the system depends on it. Returns `None` if the
+    /// description is not in the catalogue, and for a system with constraints, whose Lagrangian alone does not determine its motion.
     #[doc(hidden)]
     pub fn visit<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
         if self.constraints().is_some() { None } else { self.visit_unconstrained(visitor) }
@@ -303,12 +305,12 @@ impl<S: Scalar> SystemInstance<S> {
     pub fn visit_unconstrained<V: LagrangianVisitor>(&self, visitor: V) -> Option<V::Output> {
         visit_lagrangian(self, visitor)
     }
-    /// Acceleration of one state by the closed form, which shares only the parameters with the Lagrangian. A system from a description has
-    /// no closed form, and its Lagrangian is differentiated. `NaN` where the mass matrix is singular.
+    /// Computes the acceleration at one state from the closed form, which shares only the parameters with the Lagrangian. A system from a
+    /// description has no closed form; its Lagrangian is differentiated instead. The result is `NaN` where the mass matrix is singular.
     ///
     /// # Errors
-    /// [`SystemError::State`] for a state of the wrong length; [`SystemError::Constraints`] for a system that has some, whose motion
-    /// [`SystemInstance::build`] gives.
+    /// [`SystemError::State`] for a state of the wrong length; [`SystemError::Constraints`] for a system with constraints: use
+    /// [`SystemInstance::build`] for its motion.
     pub fn exact_acceleration(&self, q: &[S], v: &[S]) -> Result<Vec<S>, SystemError> {
         self.check_lengths(q, v)?;
         if self.forces().is_some() || self.is_timed() {
@@ -330,12 +332,12 @@ impl<S: Scalar> SystemInstance<S> {
             None => closed_acceleration(self, q, v),
         })
     }
-    /// Index of the coordinate whose velocity the mass shell fixes.
+    /// Returns the index of the coordinate whose velocity follows from the mass shell.
     pub fn constrained_coordinate(&self) -> Option<usize> {
         self.system.time_like.filter(|_| self.system.constraint.is_some())
     }
-    /// Puts one state on the mass shell `g(v, v) = -1` by the velocity of its time-like coordinate; systems without a
-    /// constraint leave the state alone.
+    /// Puts a state on the mass shell `g(v, v) = -1` by setting the velocity of the time-like coordinate. Without a mass shell the state is
+    /// unchanged.
     ///
     /// Outside the domain the velocity becomes `NaN` or infinite.
     ///
@@ -359,20 +361,20 @@ impl<S: Scalar> SystemInstance<S> {
             None => Ok(()),
         }
     }
-    /// Refuses coordinates where the system's chart ends (`r <= 0`, a pole, a horizon); the text states the violated condition.
+    /// Rejects coordinates outside the system's chart (`r <= 0`, a pole, a horizon).
     ///
     /// # Errors
-    /// The condition that the coordinates violate.
+    /// A text that states the condition that the coordinates violate.
     pub fn check_domain(&self, q: &[S]) -> Result<(), &'static str> {
         self.system.domain.map_or(Ok(()), |domain| domain(&leading(&self.parameters), &leading(q)))
     }
-    /// `(x, y)` of coordinates in the system's [`Plane`](super::system::Plane); `None` without a plane or for a wrong
-    /// number of coordinates.
+    /// Returns `(x, y)` of coordinates in the system's [`Plane`](super::system::Plane); `None` without a plane or for a wrong number of
+    /// coordinates.
     pub fn position_in_plane(&self, q: &[S]) -> Option<(f64, f64)> {
         let plane = self.system.plane.filter(|_| q.len() == self.coordinates)?;
         Some((plane.point)(&leading(&self.parameters), &leading(q)))
     }
-    /// The system's [`Conserved`](super::system::Conserved) vector at a state; `None` without one or for a state of the wrong
+    /// Computes the system's [`Conserved`](super::system::Conserved) vector at a state; `None` if it has none or the state has the wrong
     /// length.
     pub fn conserved(&self, q: &[S], v: &[S]) -> Option<Vec<f64>> {
         let conserved = self.system.conserved.filter(|_| self.check_lengths(q, v).is_ok())?;
@@ -380,7 +382,7 @@ impl<S: Scalar> SystemInstance<S> {
     }
 }
 
-/// The acceleration of one state by the Euler-Lagrange equations of a Lagrangian.
+/// Computes the acceleration at one state from the Euler-Lagrange equations of a Lagrangian.
 fn differentiated<S: Scalar>(
     lagrangian: &ExpressionLagrangian,
     friction: Option<Friction<S>>,
@@ -406,7 +408,7 @@ fn differentiated<S: Scalar>(
         terms.force.resize(n, S::nan());
         Rayleigh(friction).force(q, v, &mut terms.force);
     }
-    // A row that fails has the acceleration NaN, which is all that can be reported for one state.
+    // If the solution fails, the acceleration is NaN, which is the only report that a single state needs.
     let _ = terms.complete(q.len(), v, Request::ACCELERATION, &mut Workspace::new());
     terms.acceleration
 }
@@ -425,18 +427,18 @@ fn unknown_system(name: &str) -> SystemError {
     }
 }
 
-/// Reads the parameters of a system in the working precision; those not given take their defaults.
+/// Parses the parameters of a system in the working precision; missing ones take their defaults.
 ///
 /// # Errors
-/// [`SystemError`] for an unknown name or symbol, a repeated symbol, a value that is not a number or out of range.
+/// [`SystemError`] for an unknown name or symbol, a repeated symbol, or a value that is not a number or out of range.
 pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
     configure_system(resolve(name)?, given)
 }
 
-/// [`configure`] for a given system: one of the catalogue, or one made from a [description](super::Description).
+/// Does the same as [`configure`] for a given system, either from the catalogue or from a [description](super::Description).
 ///
 /// # Errors
-/// [`SystemError`] for an unknown or repeated symbol, a value that is not a number or out of range.
+/// [`SystemError`] for an unknown or repeated symbol, or a value that is not a number or out of range.
 pub fn configure_system<S: Scalar>(
     system: Cow<'static, System>,
     given: &Given,
@@ -455,7 +457,7 @@ pub fn configure_system<S: Scalar>(
     )
 }
 
-/// As [`configure_system`], with numbers as values.
+/// Does the same as [`configure_system`] for values that are already numbers.
 ///
 /// # Errors
 /// [`SystemError`] for an unknown symbol or a value out of range.
@@ -472,7 +474,7 @@ pub fn configure_values<S: Scalar>(
     )
 }
 
-/// The Euler-Lagrange terms of a system with the given parameters.
+/// Builds the model of a system with the given parameters.
 ///
 /// # Errors
 /// As [`configure`].
@@ -480,7 +482,7 @@ pub fn build<S: Scalar>(name: &str, given: &Given) -> Result<Box<dyn EulerLagran
     configure(name, given)?.build()
 }
 
-/// Refuses a symbol that the system does not have.
+/// Rejects a symbol that the system does not have.
 fn require_symbol(system: &System, symbol: &str) -> Result<(), SystemError> {
     let count = match system.size {
         Size::Fixed(_) => None,
@@ -494,7 +496,7 @@ fn require_symbol(system: &System, symbol: &str) -> Result<(), SystemError> {
     Err(SystemError::UnknownParameter { system, symbol: symbol.to_string(), known })
 }
 
-/// A system of this size with values from `find` by symbol, each with its text; missing values take their defaults.
+/// Assembles a system of this size. `find` returns the value of a symbol together with its text; missing values take their defaults.
 fn assemble<S: Scalar>(
     system: Cow<'static, System>,
     size: impl Fn(&str) -> Option<(Option<usize>, String)>,
@@ -584,7 +586,7 @@ mod tests {
         assert!(configure::<f64>("sphere-geodesic", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
         assert!(configure::<f64>("kepler", &[]).unwrap().check_domain(&[0.0, 0.0]).is_err());
         assert!(configure::<f64>("ads2-geodesic", &[]).unwrap().check_domain(&[1.0, -1.0]).is_err());
-        // The horizon moves with the mass.
+        // The horizon scales with the mass.
         let hole = |mass: &str| configure::<f64>("schwarzschild-geodesic", &given(&[("M", mass)])).unwrap();
         assert_eq!(hole("1").check_domain(&[0.0, 3.0, 1.0, 0.0]), Ok(()));
         assert!(hole("1.5").check_domain(&[0.0, 3.0, 1.0, 0.0]).is_err());
@@ -598,12 +600,12 @@ mod tests {
             configure::<f64>(name, &given(list)).unwrap().position_in_plane(q).unwrap()
         };
         let near = |(x, y): (f64, f64), (a, b): (f64, f64), size: f64| {
-            // Sine and cosine to half a unit in the last place, angles as near as pi is.
+            // Sine and cosine are accurate to half a unit in the last place, and angles are as accurate as pi.
             assert!((x - a).abs().max((y - b).abs()) <= 4.0 * f64::EPSILON * size, "({x}, {y}) for ({a}, {b})");
         };
         use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, FRAC_PI_6, PI};
         let root = 0.75f64.sqrt();
-        // One rod to the right, one up; then hanging; then three, the last up at an angle.
+        // First one rod points to the right and one up; then both hang; then three rods, the last of which points up at an angle.
         near(place("double-pendulum", &[("l1", "2"), ("l2", "0.5")], &[FRAC_PI_2, PI]), (2.0, 0.5), 2.5);
         near(place("double-pendulum", &[], &[0.0, 0.0]), (0.0, -2.0), 2.0);
         let rods = [("l1", "1"), ("l2", "2"), ("l3", "4")];

@@ -1,5 +1,5 @@
-//! Systems under constraints, by their formulas: points in Cartesian coordinates, rigid bodies by rotation matrices, wheels, geodesics by
-//! an observer's clock.
+//! Systems with constraints, described by formulas: points in Cartesian coordinates, rigid bodies with rotation matrices, wheels, and
+//! geodesics parametrized by coordinate time.
 
 use super::description::Description;
 use super::system::Range;
@@ -9,13 +9,13 @@ use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
-/// Number of bobs of the longest chain that is listed, and of the longest that is supported.
+/// Number of bobs of the longest listed chain, and of the longest supported one.
 const LISTED_BOBS: usize = 20;
 const MOST_BOBS: usize = 500;
-/// Name of a chain, before the number of its bobs.
+/// Name of a chain without the number of its bobs.
 const CHAIN: &str = "cartesian-chain-";
 
-/// The system with a given name; chains that are too long for the list have names as well.
+/// Returns the description of the system with a name, including chains that are too long for the list.
 pub(super) fn constrained_description(name: &str) -> Option<Description> {
     let bobs = name.strip_prefix(CHAIN).and_then(|bobs| bobs.parse().ok());
     match bobs.filter(|bobs| (1..=MOST_BOBS).contains(bobs)).map(chain) {
@@ -24,7 +24,7 @@ pub(super) fn constrained_description(name: &str) -> Option<Description> {
     }
 }
 
-/// Kinds of the listed systems.
+/// Returns the descriptions of the listed systems.
 pub(super) fn constrained_descriptions() -> impl Iterator<Item = Description> {
     let single = [
         on_surface("particle-on-sphere", "Heavy particle on a sphere", &["R"], "x^2 + y^2 + z^2 - R^2", 1.0),
@@ -70,16 +70,16 @@ pub(super) fn constrained_descriptions() -> impl Iterator<Item = Description> {
     single.into_iter().chain((1..=LISTED_BOBS).map(chain))
 }
 
-/// The listed systems under constraints, built on each call.
+/// Builds the listed systems with constraints.
 pub fn constrained_systems() -> Vec<System> {
-    // Formulas of this file, which a test compiles.
+    // These formulas always compile: a test checks that.
     constrained_descriptions().filter_map(|description| description.compile().ok()).collect()
 }
 
 /// A coordinate with its bounds and its velocity bounds.
 type Bounded<'a> = (&'a str, (f64, f64), (f64, f64));
 
-/// The parts of a system; the unit of each coordinate follows from its name: angles are Greek.
+/// Assembles a description; the unit of a coordinate follows from its name, since angles have Greek letters.
 fn described(
     (name, title, time_unit): (&str, &str, &str),
     lagrangian: String,
@@ -106,12 +106,12 @@ fn described(
     )
 }
 
-/// One constraint.
+/// Returns a list with one constraint.
 fn one(name: &str, formula: impl Into<String>) -> Vec<(String, String)> {
     vec![(name.to_string(), formula.into())]
 }
 
-/// A heavy point on a surface in space.
+/// A point mass under gravity on a surface in space.
 fn on_surface(name: &str, title: &str, lengths: &[&str], surface: &str, size: f64) -> Description {
     let side = (-size, size);
     let coordinates = ["x", "y", "z"].map(|name| (name, side, (-2.0, 2.0)));
@@ -141,7 +141,7 @@ fn on_ellipse() -> Description {
     )
 }
 
-/// Bobs on rods of equal length, each hanging from the previous one.
+/// A chain of bobs on rods of equal length.
 fn chain(bobs: usize) -> Description {
     let name = |axis: char, k: usize| format!("{axis}{k}");
     let names: Vec<String> = (1..=bobs).flat_map(|k| [name('x', k), name('y', k)]).collect();
@@ -166,8 +166,8 @@ fn chain(bobs: usize) -> Description {
     )
 }
 
-/// A rigid body by its rotation matrix, columns the axes of the body: `T = sum_k j_k |d(column k)/dt|^2 / 2` with
-/// `j_1 = (I2 + I3 - I1)/2` and so on.
+/// A rigid body described by its rotation matrix, whose columns are the axes of the body: `T = sum_k j_k |d(column k)/dt|^2 / 2` with `j_1
+/// = (I2 + I3 - I1)/2` and so on.
 fn body(name: &str, title: &str, heavy: bool) -> Description {
     let names: Vec<String> = (1..=3).flat_map(|i| (1..=3).map(move |k| format!("r{i}{k}"))).collect();
     let coordinates: Vec<_> = names.iter().map(|name| (name.as_str(), (-1.0, 1.0), (-3.0, 3.0))).collect();
@@ -199,7 +199,7 @@ fn body(name: &str, title: &str, heavy: bool) -> Description {
     described((name, title, "s"), lagrangian, &coordinates, &parameters, constraints)
 }
 
-/// Two heavy joints, a crank, a coupler and a rocker; the fixed pivots are at `0` and `(d, 0)`.
+/// A four-bar linkage with masses at the two moving joints: crank, coupler and rocker; the fixed pivots are at `0` and `(d, 0)`.
 fn four_bar() -> Description {
     let (near, far) = ((-1.0, 1.0), (-1.0, 4.0));
     let coordinates =
@@ -222,7 +222,7 @@ fn four_bar() -> Description {
     described(("four-bar-linkage", "Four-bar linkage", "s"), lagrangian, &coordinates, &parameters, constraints)
 }
 
-/// Chaplygin's sleigh: a blade at `(x, y)` along `theta`, the centre of mass `a` before it.
+/// Chaplygin's sleigh: a blade at `(x, y)` along `theta`, with the centre of mass a distance `a` ahead of it.
 fn sleigh() -> Description {
     let coordinates =
         [("x", (-2.0, 2.0), (-2.0, 2.0)), ("y", (-2.0, 2.0), (-2.0, 2.0)), ("theta", (0.0, TAU), (-2.0, 2.0))];
@@ -233,7 +233,7 @@ fn sleigh() -> Description {
     described(("chaplygin-sleigh", "Chaplygin's sleigh", "s"), lagrangian, &coordinates, &parameters, blade)
 }
 
-/// An upright disk that rolls on a plane, its heading `theta` and its angle of rolling `phi`.
+/// An upright disk that rolls on a plane with heading `theta` and rolling angle `phi`.
 fn disk() -> Description {
     let place = (-2.0, 2.0);
     let coordinates =
@@ -245,7 +245,7 @@ fn disk() -> Description {
     described(("rolling-disk", "Upright rolling disk", "s"), lagrangian, &coordinates, &parameters, constraints)
 }
 
-/// A geodesic with `t_dot = 1`: the evolution parameter is the coordinate time.
+/// A geodesic with `t_dot = 1`: its evolution parameter is the coordinate time.
 fn by_clock(name: &str, title: &str, space: &[Bounded<'_>], length: &str, metric: &str) -> Description {
     let coordinates: Vec<_> = [("t", (0.0, 10.0), (0.9, 1.1))].into_iter().chain(space.iter().copied()).collect();
     let lagrangian = format!("-sqrt(-({metric}))");
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn constraints_of_the_catalogue_are_independent() {
         for description in constrained_descriptions() {
-            // Checked like the description in a file.
+            // The description is checked like one from a file.
             let system = description.system().unwrap();
             let model = configure_system::<f64>(Cow::Owned(system), &[]).unwrap().build().unwrap();
             let manifold = model.manifold().unwrap();
@@ -279,7 +279,7 @@ mod tests {
             let mut a = vec![1.0; n];
             accelerations.at(&at(0.0, -1.0), &vec![0.0; n], &mut a).unwrap();
             assert!(a.iter().all(|a| a.abs() < 1e-9), "{bobs}");
-            // Level rods carry nothing: every bob falls freely.
+            // Level rods exert no force, so every bob falls freely.
             accelerations.at(&at(1.0, 0.0), &vec![0.0; n], &mut a).unwrap();
             assert!(a.chunks_exact(2).all(|a| a[0].abs() < 1e-9 && (a[1] + 9.81).abs() < 1e-9), "{bobs}");
         }

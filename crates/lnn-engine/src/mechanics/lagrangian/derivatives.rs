@@ -1,5 +1,5 @@
-//! `L`, `p`, `g`, `M`, `c` of one state by forward numbers over any base, floats or tracers that record a program; the mass matrix with its
-//! first and second derivatives by the coordinates, from which curvature is computed.
+//! Computes `L`, `p`, `g`, `M`, `c` at one state with forward-mode numbers over any base type, floats or tracers; also the mass matrix with
+//! its first and second derivatives by the coordinates, from which curvature is computed.
 
 use super::error::MechanicsError;
 use super::taylor::{Space, Taylor};
@@ -9,7 +9,7 @@ use crate::scalar::{Real, Scalar};
 use crate::tape::Depth;
 use alloc::vec::Vec;
 
-/// Outputs of one state; slices that are not needed may be empty.
+/// Outputs for one state; slices that are not needed may be empty.
 pub(super) struct StateTerms<'a, R> {
     pub lagrangian: &'a mut [R],
     pub momentum: &'a mut [R],
@@ -18,7 +18,7 @@ pub(super) struct StateTerms<'a, R> {
     pub coriolis: &'a mut [R],
 }
 
-/// Fills what is needed.
+/// Computes the requested terms.
 #[inline]
 pub(super) fn evaluate<L: Lagrangian, R: Real>(
     system: &L,
@@ -31,7 +31,7 @@ pub(super) fn evaluate<L: Lagrangian, R: Real>(
     if need.depth() <= Depth::Gradient {
         return first_order(system, parameters, q, v, need, out);
     }
-    // Conditions that the compiler decides: code for other numbers of coordinates is not generated.
+    // The compiler evaluates these conditions, so that it generates no code for other numbers of coordinates.
     match q.len() {
         1 if const { may_be::<L>(1) } => jets::<L, R, 1, 2>(system, parameters, q, v, need, out),
         2 if const { may_be::<L>(2) } => jets::<L, R, 2, 3>(system, parameters, q, v, need, out),
@@ -45,7 +45,7 @@ pub(super) fn evaluate<L: Lagrangian, R: Real>(
     }
 }
 
-/// `true` if a Lagrangian can have `n` coordinates.
+/// Returns `true` if a Lagrangian can have `n` coordinates.
 const fn may_be<L: Lagrangian>(n: usize) -> bool {
     match L::COORDINATES {
         Some(declared) => declared == n,
@@ -53,7 +53,7 @@ const fn may_be<L: Lagrangian>(n: usize) -> bool {
     }
 }
 
-/// `true` if a Lagrangian can have too many coordinates for jets.
+/// Returns `true` if a Lagrangian can have too many coordinates for jets.
 const fn may_be_large<L: Lagrangian>() -> bool {
     match L::COORDINATES {
         Some(declared) => declared > 4,
@@ -61,7 +61,7 @@ const fn may_be_large<L: Lagrangian>() -> bool {
     }
 }
 
-/// Numbers in an array where they fit, so that a single state allocates nothing.
+/// A vector stored in an array if it fits, so that a single state needs no allocation.
 struct SmallVector<T> {
     array: [T; 8],
     vector: Vec<T>,
@@ -83,7 +83,7 @@ impl<T: Real> SmallVector<T> {
     }
 }
 
-/// Value and first derivatives, one direction at a time.
+/// Computes the value and the first derivatives, one direction at a time.
 fn first_order<L: Lagrangian, R: Real>(
     system: &L,
     parameters: &[R],
@@ -112,7 +112,7 @@ fn first_order<L: Lagrangian, R: Real>(
     }
 }
 
-/// Everything from one evaluation with the second derivatives by the velocities and along `(v, 0)`; `N = H + 1`.
+/// Computes all terms in one evaluation, with second derivatives by the velocities and along `(v, 0)`; `N = H + 1`.
 #[inline]
 fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     system: &L,
@@ -127,7 +127,7 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     let mut jet_v = jet_q;
     for i in 0..H {
         jet_v[i] = Jet::variable(v[i], i);
-        // The coordinates move along the last direction of second order; `dL/dq` needs the first alone.
+        // The last second-order direction moves the coordinates along `v`; `dL/dq` only needs first-order directions.
         jet_q[i] = Jet::variable(q[i], N + i);
         jet_q[i].gradient[H] = v[i];
     }
@@ -153,7 +153,7 @@ fn jets<L: Lagrangian, R: Real, const H: usize, const N: usize>(
     }
 }
 
-/// One evaluation per pair of directions: `(0, e_i) x (0, e_j)` for `M`, `(0, e_i) x (v, 0)` for `c`.
+/// Evaluates once per pair of directions: `(0, e_i) x (0, e_j)` for `M`, `(0, e_i) x (v, 0)` for `c`.
 fn directions<L: Lagrangian, R: Real>(
     system: &L,
     parameters: &[R],
@@ -191,10 +191,10 @@ fn directions<L: Lagrangian, R: Real>(
     }
 }
 
-/// Metric `g_ij = d2L/dv_i dv_j` at a point, with its partial derivatives by the coordinates, exact to rounding.
+/// Metric `g_ij = d2L/dv_i dv_j` at a point and its partial derivatives by the coordinates, exact to rounding.
 ///
-/// The metric is the mass matrix itself: for `L = m g_ij v_i v_j / 2` it is `m g_ij`. If a Lagrangian is not quadratic in the velocities,
-/// the metric is taken at the given velocity, which the derivatives hold fixed.
+/// The metric is the mass matrix: for `L = m g_ij v_i v_j / 2` it is `m g_ij`. If a Lagrangian is not quadratic in the velocities, the
+/// metric is evaluated at the given velocity, which is held fixed in the derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetricJet<S> {
     /// `g_ij`, `(n, n)`, symmetric.
@@ -218,10 +218,10 @@ impl<S: Scalar> MetricJet<S> {
     }
 }
 
-/// Velocities that vary together at most: beyond, they are taken in blocks of half as many, two at a time.
+/// Largest number of velocities that vary together; beyond it, pairs of blocks of half this size are used.
 const VELOCITIES: usize = 8;
 
-/// The metric jets at states `(batch, n)` of a Lagrangian that is generic over numbers.
+/// Computes the metric jets at states `(batch, n)` of a Lagrangian that is generic over numbers.
 pub fn metric_jets<S: Scalar>(
     n: usize,
     (q, v): (&[S], &[S]),
@@ -258,7 +258,7 @@ pub fn metric_jets<S: Scalar>(
     Ok(q.chunks_exact(n).zip(v.chunks_exact(n)).map(jet).collect())
 }
 
-/// Groups of velocities such that every pair occurs in one of them.
+/// Divides the velocities into groups such that every pair occurs in one of them.
 fn groups(n: usize) -> Vec<Vec<usize>> {
     if n <= VELOCITIES {
         return vec![(0..n).collect()];
@@ -270,7 +270,7 @@ fn groups(n: usize) -> Vec<Vec<usize>> {
 }
 
 impl<S: Scalar> MetricJet<S> {
-    /// Takes over `g_ij` and its derivatives from a Lagrangian whose velocities `a`, `b` are those of `i`, `j`.
+    /// Copies `g_ij` and its derivatives from a Lagrangian whose velocities `a`, `b` belong to `i`, `j`.
     fn take(&mut self, space: &Space<S>, lagrangian: Taylor<'_, S>, (a, b): (usize, usize), (i, j): (usize, usize)) {
         let n = self.coordinates();
         let zero = <S as Real>::zero();

@@ -1,4 +1,4 @@
-//! Forces of drives on some coordinates that produce the accelerations of constrained motion.
+//! Computes the forces of drives on some coordinates that produce given accelerations of constrained motion.
 
 use super::constraints::{along_rows, complement, independent_rows};
 use super::{Manifold, MechanicsError, dot};
@@ -6,10 +6,10 @@ use crate::linalg::{Workspace, eigh};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// Smallest motion of the drives, relative to that of all coordinates, that they can control.
+/// Smallest motion of the drives, relative to that of all coordinates, for which they control it.
 const LEAST_MOTION: f64 = 1e-6;
 
-/// Rejects drives, given by the indices of their coordinates, that are fewer than the degrees of freedom.
+/// Rejects drives, given by the indices of their coordinates, if there are fewer than degrees of freedom.
 ///
 /// # Errors
 /// [`MechanicsError::Drives`].
@@ -26,8 +26,8 @@ pub(super) fn require<S: Scalar>(
     Ok(())
 }
 
-/// The smallest force `(n)` on the driven coordinates that has the same effect as `force` on motion under the rows `A`, `(m, n)`: `Z' B u =
-/// Z' f` with a basis `Z` of the null space of `A`. `None` if some of this motion does not move the drives.
+/// Computes the smallest force `(n)` on the driven coordinates that has the same effect as `force` on motion with the constraint rows `A`,
+/// `(m, n)`: `Z' B u = Z' f` with a basis `Z` of the null space of `A`. Returns `None` if some allowed motion does not move the drives.
 pub(super) fn driven<S: Scalar>(drives: &[usize], rows: &[S], force: &[S]) -> Option<Vec<S>> {
     let (n, count) = (force.len(), drives.len());
     let free = complement(n, &independent_rows(n, rows).1);

@@ -1,45 +1,45 @@
-//! Elimination along the pattern of a symmetric matrix, without a search for pivots, on numbers of any kind.
+//! Sparse elimination of a symmetric matrix without pivoting, for any type of number.
 
 use crate::scalar::Real;
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-/// Rows of a matrix: the nonzero elements by increasing column.
+/// Rows of a sparse matrix: the nonzero elements by increasing column.
 pub(super) type Lists<R> = Vec<Vec<(usize, R)>>;
 
-/// A linear system of equations of motion, `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, without constraints `M a = f`.
+/// The linear system of the equations of motion, `[M A^T; A 0] [a; -lambda] = [f; -gamma]`, or `M a = f` without constraints.
 pub(super) struct Balance<R> {
-    /// Number of coordinates; the equations after them are those of constraints.
+    /// Number of coordinates; their equations come first, followed by those of the constraints.
     pub coordinates: usize,
-    /// The lower triangle, the diagonal with it.
+    /// The lower triangle, including the diagonal.
     pub lower: Lists<R>,
     /// The right-hand side.
     pub right: Vec<R>,
 }
 
-/// A symmetric matrix after its elimination along its pattern.
+/// The factors of a symmetric matrix after sparse elimination.
 pub(super) struct Eliminated<R> {
     coordinates: usize,
-    /// Rows in the order of their elimination, each with the rows from which it was subtracted, and the factors.
+    /// Eliminated rows in order, each with the rows from which it was subtracted and the factors.
     steps: Vec<(usize, Vec<(usize, R)>)>,
-    /// By row.
+    /// Pivots by row.
     pivots: Vec<R>,
-    /// The value of every pivot before reduction.
+    /// The diagonal elements before elimination, by row.
     diagonal: Vec<R>,
 }
 
-/// Solves in at most `most` products: the solution, and every pivot after its original diagonal element.
+/// Solves with at most `most` products; returns the solution, and pairs of an original diagonal element and its pivot.
 pub(super) fn eliminate<R: Real>(balance: Balance<R>, most: usize) -> Option<(Vec<R>, Vec<[R; 2]>)> {
     let eliminated = Eliminated::of(balance.coordinates, balance.lower, most)?;
     Some((eliminated.solve(balance.right), eliminated.guards()))
 }
 
 impl<R: Real> Eliminated<R> {
-    /// Eliminates the matrix with this lower triangle in at most `most` products.
+    /// Factors the matrix with this lower triangle with at most `most` products.
     ///
-    /// The coordinates come first; among them, and among the constraints, the one with the least fill-in. For a positive definite `M` and
-    /// independent rows `A`, the pivots of the coordinates are positive and those of the constraints, of `-A M^-1 A^T`, are negative; the
-    /// original elements are those of this matrix.
+    /// Coordinates are eliminated before constraints, and within each kind the row with the least fill-in comes first. For a positive
+    /// definite `M` and independent rows `A`, the pivots of the coordinates are positive and those of the constraints are negative, because
+    /// they belong to `-A M^-1 A^T`; the original diagonal elements are those of this matrix.
     pub fn of(coordinates: usize, lower: Lists<R>, most: usize) -> Option<Self> {
         let count = lower.len();
         let own = |(i, row): (usize, &Vec<(usize, R)>)| row.last().filter(|(j, _)| *j == i).map(|(_, m)| *m);
@@ -58,7 +58,7 @@ impl<R: Real> Eliminated<R> {
             if left.len() == count - coordinates {
                 diagonal[coordinates..].copy_from_slice(&pivots[coordinates..]);
             }
-            // The row that fills in the least.
+            // Choose the row with the least fill-in.
             let at = (0..left.len()).min_by_key(|&at| (left[at] >= coordinates, rest[left[at]].len()))?;
             let k = left.remove(at);
             let row = core::mem::take(&mut rest[k]);
@@ -82,7 +82,7 @@ impl<R: Real> Eliminated<R> {
         Some(Self { coordinates, steps, pivots, diagonal })
     }
 
-    /// The solution of the system with this right-hand side.
+    /// Returns the solution for this right-hand side.
     pub fn solve(&self, right: Vec<R>) -> Vec<R> {
         let mut solution = right;
         for (k, factors) in &self.steps {
@@ -96,7 +96,8 @@ impl<R: Real> Eliminated<R> {
         solution
     }
 
-    /// The inverse, starting from the row eliminated last: each row follows from the later ones, and symmetry gives half of them.
+    /// Computes the inverse, starting from the row eliminated last: each row follows from the later ones, and symmetry gives half of the
+    /// elements.
     pub fn inverse(&self) -> Vec<Vec<R>> {
         let count = self.pivots.len();
         let mut inverse = vec![vec![R::zero(); count]; count];
@@ -113,7 +114,7 @@ impl<R: Real> Eliminated<R> {
         inverse
     }
 
-    /// Every pivot after its original diagonal element; for constraints with reversed sign.
+    /// Returns pairs of an original diagonal element and its pivot; those of constraints have reversed signs.
     pub fn guards(&self) -> Vec<[R; 2]> {
         let signed = |(k, pair): (usize, [R; 2])| if k < self.coordinates { pair } else { pair.map(|x| -x) };
         self.diagonal

@@ -1,6 +1,6 @@
-//! The equations of motion of a system as recorded programs: the terms needed to solve them, and their slopes by state and parameters.
+//! Recorded programs of the equations of motion of a system: the terms needed to solve them, and their derivatives by state and parameters.
 //!
-//! With the residual `r = d/dt (dL/dv) - dL/dq + dD/dv - Q = M a - h - Q` a change of any of its arguments at fixed `a` changes the
+//! The residual is `r = d/dt (dL/dv) - dL/dq + dD/dv - Q = M a - h - Q`. A change of any of its arguments at fixed `a` changes the
 //! acceleration by `-M^-1 dr`.
 
 use super::linearization::{ProgramSlopes, Rate, SlopePrograms, SparseRows, add};
@@ -20,19 +20,20 @@ use alloc::vec::Vec;
 pub struct Equations {
     /// Number of coordinates.
     pub n: usize,
-    /// How many known functions of the time they depend on, numbers of each state that both programs take last: the time itself, then inputs.
+    /// Number of known functions of the time, which both programs take as their last inputs: the time itself, then the inputs of the
+    /// system.
     pub known: usize,
-    /// As functions of `(q, v)`: the mass matrix `M`, `(n, n)`, and `h = dL/dq - (d2L/dv dq) v - dD/dv + Q`, `(n)`.
+    /// Program of `(q, v)`: the mass matrix `M`, `(n, n)`, and `h = dL/dq - (d2L/dv dq) v - dD/dv + Q`, `(n)`.
     pub motion: Arc<Program<f64>>,
-    /// As functions of `(q, v, a)`: `dr/dq`, `dr/dv`, then `dr/dp` by the chosen parameters, row by row, `(n, 2n + chosen)`.
+    /// Program of `(q, v, a)`: `dr/dq`, `dr/dv`, then `dr/dp` by the chosen parameters, row by row, `(n, 2n + chosen)`.
     pub slopes: Arc<Program<f64>>,
-    /// The active constraints, if there are any; their forces are not in `h`.
+    /// The active constraints, if there are any; `h` does not include their forces.
     pub rows: Option<RowEquations>,
 }
 
 impl Equations {
-    /// Records the equations of a system, with slopes by the parameters of these indices, under the active constraints; `None` for a system
-    /// that is not in the catalogue.
+    /// Records the equations of a system with its active constraints, and derivatives by the parameters with these indices. Returns `None`
+    /// for a system that is not in the catalogue.
     ///
     /// # Errors
     /// [`TapeError`] for a Lagrangian that branches on its data.
@@ -56,8 +57,8 @@ impl Equations {
         Ok(Some(Self { rows, ..Self::of(n, count, &parts, (chosen, &[]))? }))
     }
 
-    /// Records the equations of a sum of parts of `count` parameters, with slopes by chosen parameters and then by the factors of `terms`
-    /// that the sum may get. The time and inputs are coordinates of the parts, after `n` others.
+    /// Records the equations of a sum of parts with `count` parameters, and derivatives by chosen parameters and by the coefficients of
+    /// candidate `terms`. The time and inputs are coordinates of the parts, after `n` others.
     ///
     /// # Errors
     /// [`TapeError`] for parts that branch on their data.
@@ -104,7 +105,7 @@ impl Equations {
             mass_matrix.extend(rest);
             Some(mass_matrix)
         })?;
-        // The residual r is less the equations f.
+        // The residual r is the negative of the equations f.
         let slopes = Program::record_within(ROWS, (3 * n + known, count), |x, p| {
             let mut rows = vec![BTreeMap::new(); all];
             let x = with_known(x, (n, 3));
@@ -129,8 +130,8 @@ impl Equations {
     }
 }
 
-/// Extends vectors of `n` coordinates, `q`, `v` and perhaps `a`, by the time and the inputs, which come last in `x`: after `q` by their
-/// values, after the others by their derivatives, which are 0 except for the rate of the time.
+/// Extends the vectors `q`, `v` and possibly `a` of `n` coordinates by the time and the inputs, which come last in `x`. The extension of
+/// `q` contains their values; that of the others contains their derivatives, which are 0 except for the time.
 fn with_known<'a>(x: &[Tracer<'a, f64>], (n, vectors): (usize, usize)) -> Vec<Tracer<'a, f64>> {
     let (moving, known) = x.split_at(n * vectors);
     let last = |order: usize| -> Vec<Tracer<'a, f64>> {
@@ -142,10 +143,10 @@ fn with_known<'a>(x: &[Tracer<'a, f64>], (n, vectors): (usize, usize)) -> Vec<Tr
     moving.chunks_exact(n).enumerate().flat_map(|(order, vector)| [vector, &last(order)].concat()).collect()
 }
 
-/// A part of the equations of motion, recorded.
+/// A recorded part of the equations of motion.
 #[derive(Debug)]
 pub enum EquationPart {
-    /// A part of the Lagrangian, of state and parameters, and its rate.
+    /// A part of the Lagrangian as a function of state and parameters.
     Lagrangian {
         /// The value.
         value: Program<f64>,
@@ -159,15 +160,15 @@ pub enum EquationPart {
         /// Its rate.
         rate: Rate<f64>,
     },
-    /// Coordinates, and generalized forces on them, functions of state and parameters.
+    /// Coordinates and the generalized forces on them, as functions of state and parameters.
     Forces(Vec<(usize, Program<f64>)>),
 }
 
 impl EquationPart {
-    /// Records a function of `parameters` parameters, a part of the dissipation function if it is `friction`.
+    /// Records a function of `parameters` parameters; with `friction` it is a part of the dissipation function.
     ///
     /// # Errors
-    /// [`TapeError`] for one that branches on its data.
+    /// [`TapeError`] for a function that branches on its data.
     pub fn record(function: &impl Lagrangian, parameters: usize, friction: bool) -> Result<Self, TapeError> {
         Self::of(Value { parameters }.visit(function)?, friction)
     }
@@ -179,7 +180,7 @@ impl EquationPart {
         })
     }
 
-    /// Number of coordinates; forces may be none.
+    /// Returns the number of coordinates; `None` for forces.
     fn coordinates(&self) -> Option<usize> {
         match self {
             Self::Lagrangian { value, .. } | Self::Dissipation { value, .. } => Some(value.inputs() / 2),
@@ -187,7 +188,7 @@ impl EquationPart {
         }
     }
 
-    /// Nonzero derivatives of the equations `f` by state and chosen parameters, row by row; `x` holds `q`, `v`, `a`.
+    /// Returns the nonzero derivatives of the equations `f` by state and chosen parameters, row by row; `x` contains `q`, `v`, `a`.
     fn slopes<R: Real>(&self, x: &[R], p: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
         match self {
             Self::Lagrangian { rate, .. } | Self::Dissipation { rate, .. } => rate.slopes(x, p, chosen),
@@ -275,7 +276,7 @@ mod tests {
         a
     }
 
-    /// Values of a program of `x` and parameters at one point, and the effect of a change of one of its numbers.
+    /// Evaluates a program of `x` and parameters at one point, and returns the effect of a change of one of its inputs.
     fn evaluated(program: &Arc<Program<f64>>, fields: &[&[f64]], p: &[f64], size: usize) -> Vec<f64> {
         let mut out = vec![0.0; size];
         Replay::new(Arc::clone(program)).evaluate(1, fields, p, &mut [&mut out]).unwrap();
@@ -286,7 +287,7 @@ mod tests {
     fn equations_in_time_have_slopes_by_state_and_parameters() {
         let mut description = damped();
         let own = description.lagrangian.clone().unwrap();
-        // A mass, a moment of its rotation and a loss that change with the time.
+        // Adds a mass, a rotational moment and a loss that change with the time.
         description.lagrangian = Some(format!("{own} + (1 + t^2/9)*a_dot^2/2 + t*a*b_dot"));
         description.dissipation = Some("(c + e*t)*(b_dot - a_dot)^2/2".to_string());
         let forces = [("a", "k*cos(m*t + a) - e*b_dot*abs(a_dot)"), ("b", "c*t^2")];
@@ -300,7 +301,7 @@ mod tests {
             let found = evaluated(&equations.motion, &[&x[..2], &x[2..], &[t]], p, 6);
             (0..2).map(|i| found[2 * i] * a[0] + found[2 * i + 1] * a[1] - found[4 + i]).collect()
         };
-        // The equations without the time agree.
+        // Without the time dependence the equations agree.
         let free = configure_system::<f64>(Cow::Owned(damped().system().unwrap()), &[]).unwrap();
         let free = Equations::record(&free, &[4, 3, 0], &[]).unwrap().unwrap();
         let [own, other] = [
@@ -310,7 +311,7 @@ mod tests {
         let [c, e, _, k, m] = p[..] else { panic!("five parameters") };
         let (rate, dry) = (x[3] - x[2], e * x[2] / (x[2].powi(2) + 1e-4).sqrt());
         let q = [k * (m * t[0] + x[0]).cos() - e * x[3] * x[2].abs(), c * t[0].powi(2)];
-        // d/dt of (1 + t^2/9) a_dot and of t a, less t b_dot.
+        // d/dt of (1 + t^2/9) a_dot and of t a, minus t b_dot.
         let by_time =
             [e * t[0] * rate + dry - 2.0 * t[0] / 9.0 * x[2] + t[0] * x[3], -e * t[0] * rate - x[0] - t[0] * x[2]];
         for i in 0..2 {
@@ -343,7 +344,7 @@ mod tests {
                 assert!((difference - slopes[7 * i + column]).abs() < 1e-7, "{i} {column}: {difference} {slopes:?}");
             }
         }
-        // No state alone has an acceleration.
+        // A state without a time has no acceleration.
         let model = instance.build().unwrap();
         assert_eq!(model.acceleration(&x[..2], &x[2..]).unwrap_err(), crate::lagrangian::MechanicsError::Timed);
     }
@@ -392,7 +393,7 @@ mod tests {
     fn slopes_of_accelerations_are_those_of_differences() {
         let description = damped();
         let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
-        // Parameters are in the order of their names: c, e, g, k, m.
+        // Parameters are sorted by name: c, e, g, k, m.
         let names = ["c", "e", "g", "k", "m"];
         let values = instance.parameters.clone();
         let equations = Equations::record(&instance, &[4, 0, 1], &[]).unwrap().unwrap();

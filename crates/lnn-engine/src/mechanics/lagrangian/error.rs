@@ -1,11 +1,11 @@
-//! Failures in the terms of a batch: their kinds, and how they are found, merged and reported.
+//! Failures of the terms of a batch: their kinds, and how they are found, merged and reported.
 
 use super::{Request, Terms};
 use crate::linalg::{Failure, Workspace};
 use crate::scalar::{Scalar, vectorized};
 use alloc::vec::Vec;
 
-/// Why terms could not be computed.
+/// The reason why terms could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MechanicsError {
@@ -18,37 +18,37 @@ pub enum MechanicsError {
         /// Numbers found.
         found: usize,
     },
-    /// The mass matrix of a state cannot be solved with.
+    /// The equations with the mass matrix of a state cannot be solved.
     Singular {
         /// Row of the batch.
         row: usize,
         /// Estimated 2-norm condition number (infinite if exactly singular).
         condition: f64,
     },
-    /// A constraint that depends on the others at this state, although not elsewhere: the forces of constraint are not unique.
+    /// A constraint depends on the others at this state, although not elsewhere, so the forces of constraint are not unique.
     Dependent {
         /// Row of the batch.
         row: usize,
         /// Which constraint, from 0.
         constraint: usize,
     },
-    /// An acceleration that the constraints do not allow.
+    /// The constraints do not allow a given acceleration.
     OffConstraints {
         /// Row of the batch.
         row: usize,
         /// Index of the most violated constraint, from 0.
         constraint: usize,
-        /// Distance to the nearest state that they allow.
+        /// Distance to the nearest acceleration that they allow.
         distance: f64,
     },
-    /// Fewer drives than degrees of freedom, or a drive that is given twice.
+    /// There are fewer drives than degrees of freedom, or a drive is given twice.
     Drives {
         /// Degrees of freedom.
         expected: usize,
-        /// Different drives.
+        /// Number of different drives.
         found: usize,
     },
-    /// A state that can move while the drives stand still.
+    /// The state can move while the drives are at rest.
     Undriven {
         /// Row of the batch.
         row: usize,
@@ -60,18 +60,18 @@ pub enum MechanicsError {
         /// Which term.
         what: &'static str,
     },
-    /// A state at which the mass matrix of a model that requires a certificate is not certified.
+    /// The model requires a certificate, but its mass matrix is not certified at this state.
     Uncertified {
         /// Row of the batch.
         row: usize,
     },
-    /// A model that a flag has ended.
+    /// A flag has ended the evaluation.
     Interrupted,
-    /// A system that depends on the time, which a state does not contain.
+    /// The system depends on the time, which a state does not contain.
     Timed,
-    /// Derivatives that a model does not have.
+    /// The model does not have the required derivatives.
     Derivatives {
-        /// Of which term.
+        /// The term whose derivatives are missing.
         what: &'static str,
     },
 }
@@ -112,7 +112,7 @@ impl core::fmt::Display for MechanicsError {
 impl core::error::Error for MechanicsError {}
 
 impl MechanicsError {
-    /// Row of the state that failed; `None` for an error that does not concern one state.
+    /// Returns the row of the state that failed; `None` if the error does not concern one state.
     pub fn row(&self) -> Option<usize> {
         match *self {
             Self::Singular { row, .. }
@@ -127,7 +127,7 @@ impl MechanicsError {
         }
     }
 
-    /// The failure of the state, moved to another row.
+    /// Returns the same failure for another row.
     pub(crate) fn at_row(mut self, to: usize) -> Self {
         if let Self::Singular { row, .. }
         | Self::Dependent { row, .. }
@@ -141,7 +141,7 @@ impl MechanicsError {
         self
     }
 
-    /// A state whose acceleration cannot be solved for.
+    /// Returns the error for a state whose acceleration could not be solved for.
     pub fn unsolved(row: usize, failure: Failure) -> Self {
         match failure {
             Failure::Singular { condition } => Self::Singular { row, condition },
@@ -151,28 +151,28 @@ impl MechanicsError {
 }
 
 impl<S: Scalar> Terms<S> {
-    /// Merges failures with the existing ones; for each row one is kept, preferably from `found`.
+    /// Merges failures into the existing ones and keeps one for each row, preferably from `found`.
     pub fn prepend_failures(&mut self, mut found: Vec<MechanicsError>) {
         if found.is_empty() {
             return;
         }
         found.append(&mut self.failures);
-        // The sort is stable, so that the first of a row stays the first.
+        // Sorting is stable, so that the first failure of a row stays first.
         found.sort_by_key(MechanicsError::row);
         found.dedup_by_key(|error| error.row());
         self.failures = found;
     }
 
-    /// The first failure, as the outcome of the batch.
+    /// Returns the first failure as the outcome of the batch.
     ///
     /// # Errors
-    /// That failure.
+    /// The first failure.
     pub fn outcome(&self) -> Result<(), MechanicsError> {
         self.failures.first().map_or(Ok(()), |&error| Err(error))
     }
 
-    /// `true` if [`Terms::failures`] lists all failures, so that the other rows can be used. After a success the list is empty, even if the
-    /// model does not touch it.
+    /// Returns `true` if [`Terms::failures`] lists all failures, so that the other rows can be used. After a success it clears the list,
+    /// even if the model does not touch it.
     pub fn record_failures(&mut self, outcome: &Result<(), MechanicsError>) -> bool {
         if outcome.is_ok() {
             self.failures.clear();
@@ -184,7 +184,7 @@ impl<S: Scalar> Terms<S> {
     /// Removes and returns the failures of the wrapped model.
     ///
     /// # Errors
-    /// `outcome`, if it does not belong to rows.
+    /// `outcome`, if it does not concern single rows.
     pub fn drain_failures(
         &mut self,
         outcome: Result<(), MechanicsError>,
@@ -198,10 +198,10 @@ impl<S: Scalar> Terms<S> {
 }
 
 impl<S: Scalar> Terms<S> {
-    /// [`Terms::complete`] for a wrapper, which has drained the failures of the model inside before.
+    /// Does the same as [`Terms::complete`] for a wrapper that has drained the failures of the inner model before.
     ///
     /// # Errors
-    /// The first failure, of either.
+    /// The first failure of the wrapper or the inner model.
     pub(crate) fn complete_beside(
         &mut self,
         failures: Vec<MechanicsError>,
@@ -217,7 +217,7 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
-/// Adds the rows of a field `(batch, width)` that are not finite.
+/// Adds a failure for each row of a field `(batch, width)` that is not finite.
 #[inline]
 pub(super) fn not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize, found: &mut Vec<MechanicsError>) {
     if !all_finite(field) {
@@ -231,7 +231,7 @@ fn rows_not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize, fou
     found.extend(rows.map(|(row, _)| MechanicsError::NotFinite { row, what }));
 }
 
-/// `true` if every number is finite; no branch before the end.
+/// Returns `true` if all numbers are finite; it branches only at the end.
 #[inline(always)]
 fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
     if numbers.len() < WIDE {
@@ -244,7 +244,7 @@ fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
     }
 }
 
-/// From this many numbers on, calls of the widest vectors pay.
+/// From this many numbers on, a call of the widest vector instructions is worthwhile.
 const WIDE: usize = 64;
 
 #[inline(always)]
@@ -287,7 +287,7 @@ mod tests {
         let failed = terms.drain_failures(Err(MechanicsError::Uncertified { row: 2 }));
         assert_eq!(failed, Ok(vec![MechanicsError::Uncertified { row: 2 }]));
         assert_eq!(terms.outcome(), Ok(()));
-        // Remains of an earlier batch do not count.
+        // Failures of an earlier batch are ignored.
         terms.failures.push(MechanicsError::Uncertified { row: 2 });
         assert_eq!(terms.drain_failures(Ok(())), Ok(Vec::new()));
         assert_eq!(terms.outcome(), Ok(()));

@@ -1,4 +1,4 @@
-//! Solves for accelerations and energy, given the terms `L`, `p`, `g`, `M`, `c`, `Q`; solves for the forces that make a motion.
+//! Solves for accelerations and energy, given the terms `L`, `p`, `g`, `M`, `c`, `Q`; and for the forces that produce a given motion.
 
 use super::constraints::{Motion, accelerate, along_rows, dot, length};
 use super::drives::{driven, require};
@@ -10,7 +10,7 @@ use crate::scalar::{Real, Scalar, update};
 use alloc::vec::Vec;
 
 impl<S: Scalar> Terms<S> {
-    /// Empties every field, keeping the buffers.
+    /// Clears every field but keeps the buffers.
     pub fn clear(&mut self) {
         let Self {
             lagrangian,
@@ -32,7 +32,7 @@ impl<S: Scalar> Terms<S> {
         self.clear_constraints();
     }
 
-    /// Empties the fields of constraints, for a model without any.
+    /// Clears the constraint fields, for a model without constraints.
     pub(super) fn clear_constraints(&mut self) {
         self.constraints = 0;
         let Self { constraint_matrix, constraint_drift, multipliers, constraint_force, .. } = self;
@@ -41,7 +41,7 @@ impl<S: Scalar> Terms<S> {
         }
     }
 
-    /// The forces of constraint from their multipliers.
+    /// Computes the forces of constraint from their multipliers.
     pub(super) fn sum_constraint_forces(&mut self, n: usize) {
         let m = self.constraints;
         self.constraint_force.clear();
@@ -57,15 +57,15 @@ impl<S: Scalar> Terms<S> {
         }
     }
 
-    /// Adds `a = M^-1 (g - c + Q)` and `E = p.v - L` if requested, then checks every filled field; with constraints in the terms,
-    /// accelerations, multipliers and forces of constraint.
+    /// Computes `a = M^-1 (g - c + Q)` and `E = p.v - L` if requested, then checks every filled field. With constraints in the terms, it
+    /// computes accelerations, multipliers and forces of constraint.
     ///
-    /// `v` is `(batch, n)`; `L`, `p`, `g`, `M`, `c` must be filled as far as the request needs them, and `Q` if there are forces that are
-    /// not in `L`. A single coordinate is divided, not factored.
+    /// `v` is `(batch, n)`; `L`, `p`, `g`, `M`, `c` must be filled as far as the request needs them, and `Q` if there are forces that do
+    /// not follow from `L`. A single coordinate is solved by division.
     ///
     /// # Errors
-    /// [`MechanicsError`] naming the first row with a singular mass matrix or a term that is not finite, every such row in
-    /// [`Terms::failures`]; accelerations that cannot be solved for are `NaN`, everything else is filled.
+    /// [`MechanicsError`] for the first row with a singular mass matrix or a term that is not finite; [`Terms::failures`] lists every such
+    /// row. Accelerations without a solution are `NaN`, and everything else is filled.
     pub fn complete(
         &mut self,
         n: usize,
@@ -120,7 +120,7 @@ impl<S: Scalar> Terms<S> {
             self.sum_constraint_forces(n);
             workspace.give_vector(right);
         }
-        // Reports a number that was not finite before the solve rather than the solve.
+        // An input that is not finite is reported in preference to the failed solution.
         let m = self.constraints;
         let fields: [(&'static str, &[S], usize); 10] = [
             ("Lagrangian", &self.lagrangian, 1),
@@ -144,11 +144,11 @@ impl<S: Scalar> Terms<S> {
 }
 
 impl<S: Scalar> Terms<S> {
-    /// Adds external forces, `(batch, n)`, to terms that were computed with [`Request::ACCELERATION`] and without a failure: `M^-1 Q` to
-    /// the accelerations, `Q` to the forces and `-v.Q` to the power they take.
+    /// Adds external forces, `(batch, n)`, to terms that were computed with [`Request::ACCELERATION`] without a failure: adds `M^-1 Q` to
+    /// the accelerations, `Q` to the forces and `-v.Q` to the dissipated power.
     ///
     /// # Errors
-    /// [`MechanicsError`] naming the first row whose force is not finite or whose mass matrix is singular.
+    /// [`MechanicsError`] for the first row whose force is not finite or whose mass matrix is singular.
     pub fn add_force(
         &mut self,
         n: usize,
@@ -196,7 +196,7 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
-/// Generalized forces of known states and accelerations, `(batch, n)`, in the unit of `L` per unit of each coordinate.
+/// Generalized forces for given states and accelerations, `(batch, n)`, in the unit of `L` per unit of each coordinate.
 ///
 /// `generalized = friction + external + constraint`, where
 ///
@@ -207,29 +207,28 @@ impl<S: Scalar> Terms<S> {
 /// constraint  = A^T lambda       what the constraints carry of it, nothing for a model without
 /// ```
 ///
-/// `P` removes the part along the rows `A` of constraints. A motion determines an external force only up to forces along the rows, which
-/// the constraints carry: `external` is the smallest one.
+/// `P` removes the component along the rows `A` of constraints. A motion determines an external force only up to forces along the rows,
+/// which the constraints carry; `external` is the smallest solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InverseDynamics<S> {
     /// All forces that are not in `L`, including friction.
     pub generalized: Vec<S>,
-    /// Force of the model's friction; empty for a model that
-    /// [conserves its energy](EulerLagrange::conserves_energy).
+    /// Force of the model's friction; empty for a model that [conserves its energy](EulerLagrange::conserves_energy).
     pub friction: Vec<S>,
-    /// External force, such as the torque of a motor; for a model learned with known forces, its prediction of them.
+    /// External force, such as the torque of a motor; for a model learned with known forces, its prediction of these.
     pub external: Vec<S>,
-    /// Force of the constraints under it; empty for a model without.
+    /// Force of the constraints under the external force; empty for a model without constraints.
     pub constraint: Vec<S>,
-    /// Their multipliers `lambda`, `(batch, m)`.
+    /// Multipliers `lambda` of the constraints, `(batch, m)`.
     pub multipliers: Vec<S>,
 }
 
-/// Accelerations are accepted if they violate the constraints by less than this share of their size, or of the size that the forces give
-/// them: as many digits as a person writes.
+/// Accelerations are accepted if they violate the constraints by less than this fraction of their size, or of the size of the accelerations
+/// that the forces cause. This allows for values that a person has rounded to three digits.
 const NEAR: f64 = 1e-3;
 
-/// Forces that give the states `(q, v)` the accelerations `a`, all `(batch, n)` in physical units. No mass matrix is inverted, so it may be
-/// singular.
+/// Computes the forces that produce the accelerations `a` at the states `(q, v)`, all `(batch, n)` in physical units. No mass matrix is
+/// inverted, so it may be singular.
 ///
 /// ```
 /// use lnn::lagrangian::{configure, inverse_dynamics};
@@ -243,7 +242,7 @@ const NEAR: f64 = 1e-3;
 /// ```
 ///
 /// # Errors
-/// [`MechanicsError`] of the model; accelerations of another shape or that are not finite.
+/// [`MechanicsError`] of the model; also if the accelerations have another shape or are not finite.
 pub fn inverse_dynamics<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
@@ -253,13 +252,13 @@ pub fn inverse_dynamics<S: Scalar>(
     inverse_dynamics_by_drives(model, &[], [q, v, a])
 }
 
-/// [`inverse_dynamics`] by drives, given by the indices of their coordinates: the external force is 0 on all other coordinates. It is
-/// unique if there are as many drives as degrees of freedom, and the smallest one if there are more. Without drives, every coordinate is
-/// driven.
+/// Computes [`inverse_dynamics`] with drives, given by the indices of their coordinates: the external force is 0 on all other coordinates.
+/// It is unique if there are as many drives as degrees of freedom, and the smallest one if there are more. Without drives, every coordinate
+/// is driven.
 ///
 /// # Errors
 /// Those of [`inverse_dynamics`]; [`MechanicsError::Drives`] for fewer drives than degrees of freedom, [`MechanicsError::Undriven`] for a
-/// state that can move while they stand still.
+/// state that can move while the drives are at rest.
 pub fn inverse_dynamics_by_drives<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     drives: &[usize],
@@ -269,24 +268,24 @@ pub fn inverse_dynamics_by_drives<S: Scalar>(
     failures.first().map_or(Ok(forces), |&error| Err(error))
 }
 
-/// Parts of the external force of known states and accelerations, `(batch, n)` each: the motion requires `inertial + coriolis + gravity -
-/// friction`, and constraints may carry a part of it.
+/// Components of the external force for given states and accelerations, `(batch, n)` each: the motion requires `inertial + coriolis +
+/// gravity - friction`, part of which constraints may carry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceParts<S> {
     /// `M a`.
     pub inertial: Vec<S>,
     /// Coriolis and centrifugal forces.
     pub coriolis: Vec<S>,
-    /// `-dL/dq` at rest: the force that holds the state against gravity and springs.
+    /// `-dL/dq` at rest: the force that balances gravity and springs.
     pub gravity: Vec<S>,
     /// `-dD/dv`; empty for a model that [conserves its energy](EulerLagrange::conserves_energy).
     pub friction: Vec<S>,
 }
 
-/// The parts of [`inverse_dynamics`].
+/// Computes the components of the forces of [`inverse_dynamics`].
 ///
 /// # Errors
-/// As [`inverse_dynamics`].
+/// Those of [`inverse_dynamics`].
 pub fn force_parts<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
@@ -297,11 +296,11 @@ pub fn force_parts<S: Scalar>(
     failures.first().map_or(Ok(parts), |&error| Err(error))
 }
 
-/// [`force_parts`] at times `(batch)`, which only a model that depends on the time needs, with an error for every row that fails, whose inertial
-/// part is `NaN`. If the momentum depends on the time, its derivative at a fixed state counts as gravity.
+/// Computes [`force_parts`] at times `(batch)`, which only a time-dependent model needs. Returns an error for every row that fails, whose
+/// inertial part is `NaN`. If the momentum depends on the time, its partial derivative by the time counts as gravity.
 ///
 /// # Errors
-/// A [`MechanicsError`] that concerns no single row.
+/// A [`MechanicsError`] that concerns more than single rows.
 pub fn force_parts_by_rows<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     [q, v, a]: [&[S]; 3],
@@ -319,11 +318,11 @@ pub fn force_parts_by_rows<S: Scalar>(
     Ok((ForceParts { inertial, coriolis, gravity, friction: moving.friction }, failures))
 }
 
-/// `inverse_dynamics_by_drives` at times `(batch)`, which only a model that depends on the time needs, with an error for every row that fails,
-/// whose forces are `NaN`.
+/// Computes `inverse_dynamics_by_drives` at times `(batch)`, which only a time-dependent model needs. Returns an error for every row that
+/// fails, whose forces are `NaN`.
 ///
 /// # Errors
-/// A [`MechanicsError`] that concerns no single row.
+/// A [`MechanicsError`] that concerns more than single rows.
 pub fn inverse_dynamics_by_rows<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     drives: &[usize],
@@ -351,7 +350,7 @@ pub fn inverse_dynamics_by_rows<S: Scalar>(
     Ok((InverseDynamics { generalized, friction, external, constraint, multipliers }, failures))
 }
 
-/// `M a + c - g` of every row, and its terms; the failures list the rows that fail.
+/// Computes `M a + c - g` of every row, and its terms; the failures list the rows that fail.
 fn all_forces<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     [q, v, a]: [&[S]; 3],
@@ -380,17 +379,17 @@ fn all_forces<S: Scalar>(
     Ok((generalized, terms))
 }
 
-/// Forces divided into external forces and forces of constraint.
+/// Forces separated into external forces and forces of constraint.
 struct Held<S> {
     external: Vec<S>,
     constraint: Vec<S>,
     multipliers: Vec<S>,
-    /// Rows whose accelerations the constraints do not allow, or the drives cannot produce.
+    /// Failures of rows whose accelerations the constraints do not allow or the drives cannot produce.
     refused: Vec<MechanicsError>,
 }
 
 impl<S: Scalar> Held<S> {
-    /// Divides all forces, `(batch, n)`, with the friction in the terms.
+    /// Separates the total forces, `(batch, n)`, using the friction in the terms.
     fn of(n: usize, terms: &Terms<S>, (generalized, a): (&[S], &[S]), drives: &[usize]) -> Self {
         let mut external = generalized.to_vec();
         external.iter_mut().zip(&terms.force).for_each(|(all, &friction)| *all -= friction);
@@ -497,7 +496,7 @@ mod tests {
         terms.add_force(2, &v, &[-1.0, 2.0, 5.0, 7.0], &mut workspace).unwrap();
         assert_eq!(terms.acceleration, [0.5, 1.25, 5.0, 7.0]);
         assert_eq!((terms.force, terms.dissipation), (vec![-1.0, 2.0, 5.0, 7.0], vec![-3.0, -15.0]));
-        // With the model's own friction, and one coordinate.
+        // One coordinate, with friction of the model.
         let mut one = Terms {
             mass_matrix: vec![2.0],
             acceleration: vec![1.0],

@@ -1,4 +1,4 @@
-//! Events as formulas of state, time and parameters, as a system file states them.
+//! Events given as formulas of state, time and parameters in a system file.
 
 use super::expression::Formula;
 use crate::forward::Dual;
@@ -6,29 +6,29 @@ use crate::scalar::{Real, Scalar};
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// An event whose formulas have the time as a coordinate after those of the system.
+/// An event; in its formulas the time is a coordinate after those of the system.
 #[derive(Clone, Debug)]
 pub struct FormulaEvent {
     /// Its name in the file.
     pub name: String,
-    /// `true` if zeros of this direction in time count.
+    /// `true` if zeros where the value decreases with time count.
     pub falling: bool,
-    /// As [`FormulaEvent::falling`].
+    /// `true` if zeros where the value increases with time count.
     pub rising: bool,
-    /// Which of its zeros ends the motion, counted from 1.
+    /// Number of the zero that ends the motion, counted from 1.
     pub last: Option<usize>,
     pub(super) when: Formula,
     pub(super) restitution: Option<Formula>,
 }
 
 impl FormulaEvent {
-    /// `true` if velocities change at its zeros.
+    /// Returns `true` if the velocities jump at its zeros.
     pub fn is_impact(&self) -> bool {
         self.restitution.is_some()
     }
 }
 
-/// An event of a system file, with values of its parameters.
+/// An event of a system file together with values of its parameters.
 #[derive(Clone, Debug)]
 pub struct GivenEvent<S> {
     /// The event as described in the file.
@@ -37,7 +37,7 @@ pub struct GivenEvent<S> {
 }
 
 impl<S: Scalar> GivenEvent<S> {
-    /// The event for these parameters.
+    /// Combines an event with values of its parameters.
     pub(super) fn new(event: FormulaEvent, parameters: Vec<S>) -> Self {
         Self { event, parameters }
     }
@@ -46,12 +46,12 @@ impl<S: Scalar> GivenEvent<S> {
         formula.evaluate(&self.parameters, &[q, &[t]].concat(), v)
     }
 
-    /// The number that vanishes at the event.
+    /// Returns the number that vanishes at the event.
     pub fn value(&self, t: S, state: (&[S], &[S])) -> S {
         self.evaluate(&self.event.when, t, state)
     }
 
-    /// Writes its derivatives by the coordinates, `(n)`, and returns the one by the time.
+    /// Writes its derivatives by the coordinates, `(n)`, and returns its derivative by the time.
     pub fn slopes(&self, t: S, (q, v): (&[S], &[S]), normal: &mut [S]) -> S {
         let (n, one) = (q.len(), <S as Real>::one());
         let mut inputs: Vec<Dual<S>> =
@@ -67,7 +67,7 @@ impl<S: Scalar> GivenEvent<S> {
         slope(n)
     }
 
-    /// The coefficient of restitution at a state, of an impact.
+    /// Returns the coefficient of restitution of an impact at a state.
     pub fn restitution(&self, t: S, state: (&[S], &[S])) -> Option<S> {
         self.event.restitution.as_ref().map(|formula| self.evaluate(formula, t, state))
     }

@@ -1,4 +1,4 @@
-//! Generalized forces as formulas of state and parameters, as a system file states them.
+//! Generalized forces given as formulas of state and parameters in a system file.
 
 use super::expression::Formula;
 use super::linearization::{Held, Products};
@@ -11,22 +11,22 @@ use alloc::collections::BTreeMap;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// Forces `Q_i(q, v)` on some of the coordinates; those on the others are 0. The time, if they depend on it, is the last coordinate.
+/// Forces `Q_i(q, v)` on some of the coordinates; other forces are 0. If they depend on the time, it is the last coordinate.
 #[derive(Clone, Debug)]
 pub struct FormulaForces {
-    /// Numbers of coordinates and of parameters.
+    /// Numbers of coordinates and parameters.
     size: (usize, usize),
     /// Coordinates and their formulas.
     formulas: Arc<[(usize, Formula)]>,
 }
 
 impl FormulaForces {
-    /// Forces as functions of the coordinates and parameters.
+    /// Wraps compiled formulas of the coordinates and parameters.
     pub(super) fn compiled(size: (usize, usize), formulas: Vec<(usize, Formula)>) -> Self {
         Self { size, formulas: formulas.into() }
     }
 
-    /// The forces as programs of `q`, `v` and parameters, each with its coordinate.
+    /// Records the forces as programs of `q`, `v` and parameters, each with its coordinate.
     ///
     /// # Errors
     /// [`TapeError`] for formulas that are too long.
@@ -63,11 +63,12 @@ impl<S: Scalar> GeneralizedForce<S> for GivenForces<S> {
     }
 }
 
-/// Derivatives of the forces by forward numbers.
+/// Computes derivatives of the forces with forward-mode numbers.
 struct ForceSlopes<'a, S>(&'a GivenForces<S>);
 
 impl<S: Scalar> ForceSlopes<'_, S> {
-    /// Derivatives of a force at a state by the positions, velocities and parameters that it depends on: pairs of index and value.
+    /// Returns the derivatives of a force at a state by the positions, velocities and parameters that it depends on, as pairs of index and
+    /// value.
     fn of(&self, formula: &Formula, (q, v): (&[S], &[S])) -> BTreeMap<usize, S> {
         let (n, zero) = (q.len(), <S as Real>::zero());
         let mut inputs: Vec<Dual<S>> = q.iter().chain(v).chain(&self.0.parameters).map(|x| Dual::lift(*x)).collect();

@@ -1,22 +1,22 @@
-//! Groups of coordinates that do not act on each other: the motion leaves the Lagrangian of each group a factor of its own, its sign
-//! included.
+//! Groups of coordinates that do not interact. The Lagrangian of each group can be multiplied by any factor, also a negative one, without
+//! changing the motion.
 
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::linalg::{components, dot};
 use crate::scalar::Scalar;
 
-/// Largest number of states that are used to detect couplings.
+/// Largest number of states for the detection of couplings.
 const STATES: usize = 64;
 
-/// Accelerations of states, `(states, n)` each.
+/// A function that computes accelerations at states, `(states, n)` each.
 pub(crate) type Accelerations<'a, S> = &'a dyn Fn(&[S], &[S]) -> Vec<f64>;
 
-/// Groups of `n` coordinates that act on each other, from the `accelerations` at states, `(states, n)`; those that are not finite are
-/// ignored.
+/// Divides `n` coordinates into interacting groups, using the `accelerations` at states, `(states, n)`; accelerations that are not finite
+/// are ignored.
 ///
-/// Coordinate `j` acts on `i` if the acceleration of `i` changes by more than `noise[i]`, root mean square over the states, when the
-/// position and the velocity of `j` are replaced by those of another state. A single state shows nothing, and all coordinates are then one
-/// group.
+/// Coordinate `j` acts on `i` if the acceleration of `i` changes by more than `noise[i]` (root mean square over the states) when the
+/// position and velocity of `j` are replaced by those of another state. With a single state this cannot be tested, and all coordinates form
+/// one group.
 pub fn acting_groups<S: Scalar>(
     n: usize,
     (q, v): (&[S], &[S]),
@@ -41,26 +41,26 @@ pub fn acting_groups<S: Scalar>(
                 .collect::<Vec<_>>()
         })
         .collect();
-    // Couplings that cannot be evaluated are assumed.
+    // Couplings that cannot be evaluated are assumed to exist.
     let acts = |&(j, i): &(usize, usize)| changes[j * n + i] > noise[i] || changes[j * n + i].is_nan();
     components(n, pairs(n).filter(acts))
 }
 
-/// Root mean square of the finite ones of some numbers, `NaN` without any.
+/// Returns the root mean square of the finite numbers, `NaN` without any.
 fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.filter(|x| x.is_finite()).fold((0.0, 0.0), |(sum, count), x| (sum + x * x, count + 1.0));
     f64::sqrt(sum / count)
 }
 
-/// Groups of coordinates of a Lagrangian that is known to rounding, by its accelerations and its mass matrix at states `(states, n)`: an
-/// influence below half of the digits does not count. Under constraints all coordinates are one group.
+/// Divides the coordinates of an exactly known Lagrangian into groups, using its accelerations and its mass matrix at states `(states, n)`.
+/// An influence below the square root of the rounding error does not count. With constraints all coordinates form one group.
 pub fn groups<S: Scalar>(model: &dyn EulerLagrange<S>, (q, v): (&[S], &[S])) -> Vec<Vec<usize>> {
     let n = model.coordinates();
     let used = n * STATES.min(q.len() / n.max(1));
     let (q, v) = (&q[..used], &v[..used]);
     let evaluate = |q: &[S], v: &[S]| {
         let mut terms = Terms::default();
-        // Single states that fail have terms that are not finite.
+        // The terms of states that fail are not finite.
         let _ = model.terms(q, v, Request::ACCELERATION, &mut terms);
         let [m, a] =
             [&terms.mass_matrix, &terms.acceleration].map(|x| x.iter().map(|x| x.to_f64()).collect::<Vec<_>>());
@@ -81,12 +81,13 @@ pub fn groups<S: Scalar>(model: &dyn EulerLagrange<S>, (q, v): (&[S], &[S])) -> 
     components(n, pairs(n).filter(joined))
 }
 
-/// All pairs of indices below `n`.
+/// Returns all pairs of indices below `n`.
 fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..n * n).map(move |at| (at / n, at % n))
 }
 
-/// For every group the factor `s` of the smallest sum of `|s a - b|^2 / |b|^2` over matrices `(states, n, n)`; 1 where there is none.
+/// Returns for every group the factor `s` that minimizes the sum of `|s a - b|^2 / |b|^2` over matrices `(states, n, n)`; 1 if there is no
+/// minimum.
 pub fn group_factors(n: usize, groups: &[Vec<usize>], a: &[f64], b: &[f64]) -> Vec<f64> {
     let of = |group: &Vec<usize>| {
         let part = |m: &[f64]| -> Vec<f64> {
@@ -107,8 +108,8 @@ pub fn group_factors(n: usize, groups: &[Vec<usize>], a: &[f64], b: &[f64]) -> V
     groups.iter().map(of).collect()
 }
 
-/// A Lagrangian whose groups of coordinates have factors, up to a constant: `sum of s_b L_b`, where `L_b` is `L` with the coordinates of the
-/// other groups at a reference state. The motion is that of `L`.
+/// A Lagrangian whose groups of coordinates are multiplied by factors, up to a constant: `sum of s_b L_b`, where `L_b` is `L` with the
+/// coordinates of the other groups at a reference state. The motion is that of `L`.
 pub struct Regrouped<'a> {
     model: &'a dyn EulerLagrange<f64>,
     groups: Vec<Vec<usize>>,
@@ -118,8 +119,8 @@ pub struct Regrouped<'a> {
 }
 
 impl<'a> Regrouped<'a> {
-    /// `model` with the factors that bring the mass matrices of its groups closest to those of `other` at states `(states, n)`; none if all
-    /// coordinates are one group.
+    /// Multiplies the groups of `model` by the factors that bring their mass matrices closest to those of `other` at states `(states, n)`.
+    /// Returns `None` if all coordinates form one group.
     pub fn nearest(
         model: &'a dyn EulerLagrange<f64>,
         other: &dyn EulerLagrange<f64>,
@@ -197,7 +198,7 @@ mod tests {
     use crate::scalar::Real;
     use rand::Rng;
 
-    /// Three oscillators with a mass matrix that depends on the position; `coupling` joins the first and the last.
+    /// Three oscillators with a mass matrix that depends on the position; `coupling` couples the first and the last.
     struct Three;
 
     impl Lagrangian for Three {

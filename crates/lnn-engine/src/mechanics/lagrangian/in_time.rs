@@ -1,5 +1,5 @@
-//! Lagrangians and forces that depend on the time, and on inputs known as functions of it: the time and these inputs are the last
-//! coordinates of a Lagrangian, and the time passes at the rate 1.
+//! Lagrangians and forces that depend on the time, and on inputs that are known functions of it: the time and these inputs are the last
+//! coordinates of a Lagrangian, and the time increases at the rate 1.
 
 use super::{EulerLagrange, MechanicsError, Request, Terms};
 use crate::scalar::{Real, Scalar};
@@ -48,10 +48,10 @@ pub struct InTime<M, U = ()> {
 
 /// Known functions of the time.
 pub trait Inputs<S>: Send + Sync {
-    /// How many there are.
+    /// Returns the number of functions.
     fn count(&self) -> usize;
 
-    /// Writes their values at a time, `(count)`.
+    /// Writes their values, `(count)`, at a time.
     fn write(&self, t: S, values: &mut [S]);
 }
 
@@ -63,7 +63,7 @@ impl<S> Inputs<S> for () {
     fn write(&self, _: S, _: &mut [S]) {}
 }
 
-/// So many functions of the time, by one closure that writes all values.
+/// A pair of the number of functions and a closure that writes all values.
 impl<S, F: Fn(S, &mut [S]) + Send + Sync> Inputs<S> for (usize, F) {
     fn count(&self) -> usize {
         self.0
@@ -85,15 +85,15 @@ impl<S> Inputs<S> for Box<dyn Inputs<S> + '_> {
 }
 
 impl<M> InTime<M> {
-    /// The model of `n` coordinates and the time.
+    /// Wraps a model of `n` coordinates and the time.
     pub fn new(model: M) -> Self {
         Self { model, inputs: () }
     }
 }
 
 impl<M, U> InTime<M, U> {
-    /// The model of `n` coordinates, the time, and inputs, on which its forces depend but not its Lagrangian: a number of
-    /// them and a closure `Fn(t, &mut values)`, for instance.
+    /// Wraps a model of `n` coordinates, the time, and inputs, on which its forces may depend but not its Lagrangian. Inputs are, for
+    /// instance, a pair of their number and a closure `Fn(t, &mut values)`.
     pub fn with_inputs(model: M, inputs: U) -> Self {
         Self { model, inputs }
     }
@@ -104,7 +104,7 @@ impl<S: Scalar, M: EulerLagrange<S>, U: Inputs<S>> EulerLagrange<S> for InTime<M
         self.model.coordinates() - 1 - self.inputs.count()
     }
 
-    /// Refused: a state alone has no time.
+    /// Always fails, because a state alone has no time.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
         self.terms_at(&[], q, v, request, terms)
     }
@@ -142,7 +142,7 @@ impl<S: Scalar, M: EulerLagrange<S>, U: Inputs<S>> EulerLagrange<S> for InTime<M
             terms.dissipation.resize(batch, <S as Real>::zero());
             for (row, power) in terms.dissipation.iter_mut().enumerate() {
                 let time = row * all + n;
-                // A force along the time moves nothing; its power has been counted.
+                // A force along the time has no effect on the motion; its power is already counted.
                 *power += terms.dl_dq[time] + terms.force[time];
             }
         }
@@ -160,7 +160,7 @@ impl<S: Scalar, M: EulerLagrange<S>, U: Inputs<S>> EulerLagrange<S> for InTime<M
 }
 
 impl<S: Scalar> Terms<S> {
-    /// Leaves out all coordinates but the first `n`.
+    /// Removes all coordinates except the first `n`.
     fn keep_first(&mut self, n: usize, all: usize) {
         let keep = |field: &mut Vec<S>, is_kept: &dyn Fn(usize) -> bool| {
             let mut at = 0;

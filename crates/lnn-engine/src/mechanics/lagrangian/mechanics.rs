@@ -1,4 +1,4 @@
-//! A Lagrangian written by hand, with values for its parameters, as a source of Euler-Lagrange terms.
+//! A Lagrangian written by hand, with values of its parameters, as a source of Euler-Lagrange terms.
 
 use super::derivatives::{StateTerms, evaluate};
 use super::linearization::{ProgramSlopes, Rate, SlopePrograms};
@@ -16,33 +16,34 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::any::Any;
 
-/// Up to this many coordinates, a few states are evaluated by forward numbers on the stack; calling the interpreter does not pay.
+/// Up to this many coordinates, a few states are evaluated with forward-mode numbers on the stack, because the interpreter has more
+/// overhead.
 const STACK_COORDINATES: usize = 2;
-/// Batches of at least this size, a chunk of lanes, are replayed anyway.
+/// Batches of at least this size, the lanes of a chunk, are always replayed.
 const REPLAY_FROM: usize = 8;
-/// More coordinates take curvature in their own numbers, not wider ones.
+/// With more coordinates, curvature is computed in the model's precision, not in a higher one.
 const WIDE_COORDINATES: usize = 4;
 
 /// A Lagrangian and the values of its parameters.
 ///
-/// A few states of up to two coordinates are evaluated by forward numbers on the stack. Everything else replays a program of the
-/// derivatives that is recorded on first use, without zeros: a single state alone, several side by side. If that program would be too
-/// large, with some hundreds of coupled coordinates, `n + 3` sweeps of a [`tape::Recorded`] function replace it. All give the same numbers
-/// up to rounding. A Lagrangian that branches on its data cannot be recorded and is always evaluated state by state.
+/// A few states of up to two coordinates are evaluated with forward-mode numbers on the stack. Everything else replays a sparse program of
+/// the derivatives, recorded on first use, for single states or several at a time. If that program would be too large, with some hundreds
+/// of coupled coordinates, `n + 3` sweeps of a [`tape::Recorded`] function replace it. All methods agree up to rounding. A Lagrangian that
+/// branches on its data cannot be recorded and is always evaluated state by state.
 #[derive(Debug)]
 pub struct Mechanics<L, S> {
     system: L,
     evaluator: Evaluator<S>,
 }
 
-/// Code that is compiled separately for every Lagrangian: its terms state by state, and the recording of its value.
+/// The code that is compiled for each Lagrangian: its terms state by state, and the recording of its value.
 trait Form<S>: Send + Sync {
     fn coordinates(&self) -> usize;
-    /// Number of parameters, if the Lagrangian states it.
+    /// Returns the number of parameters, if the Lagrangian states it.
     fn parameter_count(&self) -> Option<usize>;
-    /// Fills the needed fields of a batch, which have their sizes.
+    /// Fills the needed fields of a batch, which already have the right sizes.
     fn states(&self, parameters: &[S], q: &[S], v: &[S], need: Request, terms: &mut Terms<S>);
-    /// The program whose one output is the value.
+    /// Records a program whose only output is the value.
     fn value(&self, parameters: usize) -> Result<Program<S>, TapeError>;
 }
 
@@ -74,7 +75,7 @@ impl<L: Lagrangian, S: Scalar> Form<S> for L {
     }
 }
 
-/// A recorded Lagrangian: its one output is the value.
+/// A recorded Lagrangian, whose only output is the value.
 #[derive(Debug)]
 pub(super) struct RecordedValue<S> {
     pub(super) value: Program<S>,
@@ -97,7 +98,7 @@ struct Evaluator<S> {
     parameters: Vec<S>,
     /// The program of the value, recorded on first use.
     value: OnceLock<Option<RecordedValue<S>>>,
-    /// The value as the engine's sweeps take it.
+    /// The value as a recorded function, for the sweeps of the engine.
     engine: OnceLock<Option<Arc<tape::Recorded<S>>>>,
     /// One program per combination of needed terms.
     programs: [OnceLock<Option<Arc<Program<S>>>>; 32],
@@ -105,7 +106,7 @@ struct Evaluator<S> {
     solved: OnceLock<Option<Solved<'static, S>>>,
     /// The programs of the derivatives of the equations of motion.
     slopes: OnceLock<Option<SlopePrograms<S>>>,
-    /// Buffers not in use; as many as there were callers at a time.
+    /// Buffers that are not in use; at most as many as there were simultaneous callers.
     #[allow(clippy::vec_box)] // They go in and out at every call.
     pool: Mutex<Vec<Box<Scratch<S>>>>,
 }
@@ -118,8 +119,8 @@ struct Scratch<S> {
 }
 
 impl<L: Lagrangian, S: Scalar> Mechanics<L, S> {
-    /// A Lagrangian with parameter values in its order; if their number differs from [`Lagrangian::parameter_count`], every call is an
-    /// error.
+    /// Combines a Lagrangian with values of its parameters, in its order. If their number differs from [`Lagrangian::parameter_count`],
+    /// every call returns an error.
     pub fn new(system: L, parameters: impl IntoIterator<Item = S>) -> Self {
         let evaluator = Evaluator {
             routines: Routines::get(),
@@ -136,7 +137,7 @@ impl<L: Lagrangian, S: Scalar> Mechanics<L, S> {
 }
 
 impl<S: Scalar> Evaluator<S> {
-    /// Refuses parameters of another number than the Lagrangian takes.
+    /// Rejects a wrong number of parameters.
     fn require_parameters(&self, form: &dyn Form<S>) -> Result<(), MechanicsError> {
         let found = self.parameters.len();
         match form.parameter_count().filter(|&expected| expected != found) {
@@ -145,13 +146,13 @@ impl<S: Scalar> Evaluator<S> {
         }
     }
 
-    /// The program of the value, recorded on first use.
+    /// Returns the program of the value, recorded on first use.
     fn value(&self, form: &dyn Form<S>) -> Option<&RecordedValue<S>> {
         let count = self.parameters.len();
         self.value.get_or_init(|| form.value(count).ok().map(|value| RecordedValue { value })).as_ref()
     }
 
-    /// The metric jets of a batch in numbers of the same or higher precision, from the program of the value.
+    /// Computes the metric jets of a batch in the same or a higher precision, from the program of the value.
     fn metric_jets<T: Scalar>(
         &self,
         form: &dyn Form<S>,
@@ -165,27 +166,27 @@ impl<S: Scalar> Evaluator<S> {
         metric_jets(form.coordinates(), (&cast(q), &cast(v)), |q, v| value.lagrangian(&parameters, q, v))
     }
 
-    /// The program that computes what is needed, recorded on first use.
+    /// Returns the program of the needed terms, recorded on first use.
     fn program(&self, form: &dyn Form<S>, need: Request) -> Option<Arc<Program<S>>> {
         let value = self.value(form)?;
         let recorded = self.programs[need.index()].get_or_init(|| program_of_terms(&value.value, need).map(Arc::new));
         recorded.clone()
     }
 
-    /// The program of the accelerations alone, recorded on first use.
+    /// Returns the program of the accelerations alone, recorded on first use.
     fn solved(&self, form: &dyn Form<S>) -> Option<Solved<'static, S>> {
         self.require_parameters(form).ok()?;
         let record = || Solved::of_value(&self.value(form)?.value, &self.parameters);
         self.solved.get_or_init(record).clone()
     }
 
-    /// The pattern of the second derivatives.
+    /// Returns the pattern of the second derivatives.
     fn pattern(&self, form: &dyn Form<S>) -> Option<Pattern> {
         self.require_parameters(form).ok()?;
         Pattern::of(&self.value(form)?.value)
     }
 
-    /// The derivatives of the equations of motion by programs that are recorded on first use.
+    /// Returns the derivatives of the equations of motion, as programs that are recorded on first use.
     fn slopes(&self, form: &dyn Form<S>) -> Option<Box<dyn Slopes<S>>> {
         self.require_parameters(form).ok()?;
         let record = || SlopePrograms::of(&Rate::of_lagrangian(&self.value(form)?.value).ok()?);
@@ -193,7 +194,7 @@ impl<S: Scalar> Evaluator<S> {
         Some(Box::new(ProgramSlopes::new(programs, &self.parameters)))
     }
 
-    /// Fills the needed fields of a batch by the engine's sweeps; `false` if that was not possible.
+    /// Fills the needed fields of a batch with sweeps of the engine; returns `false` if that is not possible.
     fn sweep(
         &self,
         form: &dyn Form<S>,
@@ -227,7 +228,7 @@ impl<S: Scalar> Evaluator<S> {
         true
     }
 
-    /// Fills the needed fields of a batch by replaying a program; whether that was possible.
+    /// Fills the needed fields of a batch by replaying a program; returns `false` if that is not possible.
     fn replay(
         &self,
         form: &dyn Form<S>,
@@ -242,7 +243,7 @@ impl<S: Scalar> Evaluator<S> {
             replays.push((index, Replay::new(program)));
             replays.len() - 1
         });
-        // The order of the recording; fields that are not needed are empty.
+        // The outputs in the order of the recording; fields that are not needed are empty.
         let mut outputs = terms.derivatives_mut().map(Vec::as_mut_slice);
         replays[at].1.evaluate(q.len() / form.coordinates(), &[q, v], &self.parameters, &mut outputs).is_ok()
     }
@@ -285,8 +286,8 @@ impl<S: Scalar> Evaluator<S> {
         terms.complete(n, v, request, &mut scratch.workspace)
     }
 
-    /// Evaluates the rows that are not finite again, by forward numbers, which treat an infinite derivative along a direction without
-    /// change as zero.
+    /// Repeats the evaluation of rows that are not finite with forward-mode numbers, which treat an infinite derivative in a direction of
+    /// no change as zero.
     #[cold]
     fn refine(&self, form: &dyn Form<S>, (q, v): (&[S], &[S]), request: Request, terms: &mut Terms<S>) {
         let n = form.coordinates();
@@ -319,13 +320,13 @@ impl<S: Scalar> Evaluator<S> {
 }
 
 impl<S: Scalar> Terms<S> {
-    /// The fields that derivatives of `L` fill, in the order of the programs.
+    /// Returns the fields for derivatives of `L`, in the order of the programs.
     fn derivatives_mut(&mut self) -> [&mut Vec<S>; 5] {
         let Self { lagrangian, momentum, dl_dq, mass_matrix, coriolis, .. } = self;
         [lagrangian, momentum, dl_dq, mass_matrix, coriolis]
     }
 
-    /// Resizes the requested fields, to be overwritten.
+    /// Resizes the requested fields, whose contents will be overwritten.
     fn make_room(&mut self, n: usize, batch: usize, request: Request) {
         let needs = [
             (Request::LAGRANGIAN, 1),
@@ -340,8 +341,8 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
-/// The code of an [`Evaluator`], which this crate compiles once for each scalar: a crate with a Lagrangian of its own compiles the code of
-/// that Lagrangian alone.
+/// The code of an [`Evaluator`], compiled in this crate once for each scalar type, so that a crate that defines a Lagrangian only compiles
+/// the code of that Lagrangian.
 #[derive(Clone, Copy, Debug)]
 struct Routines<S> {
     terms: TermsOf<S>,
@@ -376,7 +377,7 @@ impl<S: Scalar> Routines<S> {
 macro_rules! compiled {
     ($($scalar:ty)*) => {$(
         impl Compiled for $scalar {
-            // Inlined elsewhere it would take the routines along.
+            // If this were inlined elsewhere, the routines would be compiled there as well.
             #[inline(never)]
             fn routines() -> &'static dyn Any {
                 &Routines::<Self>::ALL
@@ -428,7 +429,7 @@ impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for Mechanics<L, S> {
 mod tests {
     use super::*;
 
-    /// A chain of `n` pendula in absolute angles, with a spring whose stiffness depends on a branch, and a damper-like product.
+    /// A chain of `n` pendula in absolute angles, with a spring whose stiffness depends on a branch, and a product similar to a damper.
     struct Chain(usize);
 
     impl Lagrangian for Chain {
@@ -490,7 +491,7 @@ mod tests {
         assert!(operations(Request::LAGRANGIAN) < operations(Request::DL_DQ));
     }
 
-    /// A second derivative by the velocities that is infinite although nothing depends on them.
+    /// A Lagrangian with an infinite second derivative by a velocity on which nothing depends.
     struct Sliding;
 
     impl Lagrangian for Sliding {
@@ -510,7 +511,7 @@ mod tests {
         assert_eq!(a, Ok(vec![0.0, -0.5, 0.0]));
     }
 
-    /// Pendula in absolute angles by running sums, the chain of `benches/hessians.rs`.
+    /// Pendula in absolute angles computed with running sums, as in `benches/hessians.rs`.
     struct Plain(usize);
 
     impl Lagrangian for Plain {
@@ -541,7 +542,7 @@ mod tests {
         }
     }
 
-    /// Masses of different sizes and springs to the neighbours.
+    /// Different masses with springs between neighbours.
     struct Lattice;
 
     impl Lagrangian for Lattice {
@@ -558,7 +559,7 @@ mod tests {
     fn zeros_and_constants_take_no_operations() {
         let model = Mechanics::<_, f64>::new(Lattice, []);
         let program = model.evaluator.program(&model.system, Request::MASS_MATRIX | Request::CORIOLIS).unwrap();
-        // The mass matrix is diagonal and constant, and no term of L joins coordinates and velocities.
+        // The mass matrix is diagonal and constant, and no term of L couples coordinates and velocities.
         assert_eq!(program.lane_operations(), 0);
         let (q, v) = states(100, 1);
         let mass = model.mass_matrix(&q, &v).unwrap();

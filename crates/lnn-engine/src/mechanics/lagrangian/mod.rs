@@ -1,7 +1,8 @@
-//! Lagrangian mechanics: one trait for a Lagrangian, one place for the Euler-Lagrange terms.
+//! Lagrangian mechanics: the trait for Lagrangians and the Euler-Lagrange terms computed from it.
 //!
-//! State `x = (q, v)`, `v = dq/dt`, both in `R^n`. `p = dL/dv`, `g = dL/dq`, `M = d2L/dv dv`, `c = (d2L/dv dq) v`,
-//! `a = M^-1 (g - c + Q)`, `E = p.v - L`; `Q` are forces that do not follow from `L`, such as friction. Batches are row-major: `(batch, n)` and `(batch, n, n)`.
+//! A state is `x = (q, v)` with `v = dq/dt`, both in `R^n`. The terms are `p = dL/dv`, `g = dL/dq`, `M = d2L/dv dv`, `c = (d2L/dv dq) v`,
+//! `a = M^-1 (g - c + Q)`, `E = p.v - L`, where `Q` are forces that do not follow from `L`, such as friction. Batches are row-major:
+//! `(batch, n)` and `(batch, n, n)`.
 
 mod accelerations;
 mod configure;
@@ -60,7 +61,7 @@ pub use terms::{EulerLagrange, Request, Terms};
 pub use torques::Torques;
 pub use wrappers::{Dissipation, Frictionless, GeneralizedForce, Rayleigh, WithForces};
 
-// For the packages of this repository.
+// These are for the other packages of this repository.
 #[cfg(feature = "rollout")]
 #[doc(hidden)]
 pub use groups::{Regrouped, acting_groups, group_factors, groups};
@@ -96,21 +97,21 @@ use constrained_systems::{constrained_description, constrained_descriptions};
 /// The same code then gives values, first and second derivatives with respect to `q`, `v` and the parameters
 /// (masses, lengths, ...), in every precision, for one state or a recorded batch.
 pub trait Lagrangian: Send + Sync {
-    /// The number that [`Lagrangian::coordinates`] returns, where it is known when the code is compiled: derivatives of single
-    /// states are then compiled for this number alone.
+    /// The value of [`Lagrangian::coordinates`], if it is known at compile time; derivatives of single states are then compiled only for
+    /// this number.
     const COORDINATES: Option<usize> = None;
 
-    /// Number of coordinates `n`.
+    /// Returns the number of coordinates `n`.
     fn coordinates(&self) -> usize;
 
-    /// Number of parameters that [`Lagrangian::lagrangian`] takes. If `Some`, a parameter vector of another length is refused with
-    /// [`MechanicsError::Shape`].
+    /// Returns the number of parameters that [`Lagrangian::lagrangian`] takes. If it is `Some`, a parameter vector of another length is
+    /// rejected with [`MechanicsError::Shape`].
     fn parameter_count(&self) -> Option<usize> {
         None
     }
 
-    /// `L(q, v)` in joules (or the unit of action per unit of the evolution parameter).
+    /// Computes `L(q, v)` in joules (or the unit of action per unit of the evolution parameter).
     ///
-    /// `parameters` in the order the system declares, `q` and `v` of length `n`.
+    /// `parameters` are in the order that the system declares; `q` and `v` have length `n`.
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R;
 }

@@ -1,4 +1,4 @@
-//! Which second derivatives of a Lagrangian can be nonzero, and which are constant.
+//! The sparsity pattern of the second derivatives of a Lagrangian: which can be nonzero, and which are constant.
 
 use crate::linalg::components;
 use crate::scalar::{Real, Scalar};
@@ -9,7 +9,7 @@ use core::fmt;
 #[cfg(feature = "serde")]
 use serde::Serialize;
 
-/// Knowledge about an element before any state is evaluated.
+/// What the recording shows about an element that is not always zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize), serde(rename_all = "lowercase"))]
 pub enum Element {
@@ -34,7 +34,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of the Lagrangian with this value; `None` if it is too large.
+    /// Finds the pattern of the Lagrangian with this value; returns `None` if it is too large.
     pub(crate) fn of<S: Scalar>(value: &Program<S>) -> Option<Self> {
         let n = value.inputs() / 2;
         let mut places = Vec::new();
@@ -78,17 +78,17 @@ impl Pattern {
         Some(pattern)
     }
 
-    /// Groups of coordinates that no second derivative joins, each in rising order.
+    /// Returns the groups of coordinates that are not coupled by any second derivative, each in increasing order.
     pub fn blocks(&self) -> Vec<Vec<usize>> {
         let joined = [&self.mass_matrix, &self.mixed, &self.stiffness].into_iter().flatten();
         components(self.coordinates, joined.map(|&(i, j, _)| (i, j)))
     }
 }
 
-/// Most rows of a picture; a larger matrix has several elements to a sign.
+/// Largest number of rows in a picture; in pictures of larger matrices a character represents several elements.
 const PICTURE: usize = 64;
 
-/// Pictures of the three matrices: `#` varies, `=` is constant, `.` is zero.
+/// Draws the three matrices: `#` is a varying element, `=` a constant one, `.` a zero.
 impl fmt::Display for Pattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let n = self.coordinates;
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::lagrangian::{EulerLagrange, Lagrangian, Mechanics};
 
-    /// A line of masses whose first one has a metric, and a mass apart from it.
+    /// A line of coupled masses, the first of which has a metric, and a separate mass.
     struct Line;
 
     impl Lagrangian for Line {

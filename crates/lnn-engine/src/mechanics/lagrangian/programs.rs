@@ -1,4 +1,4 @@
-//! Programs of the derivatives that the equations of motion are made of, recorded from the program of a Lagrangian's value.
+//! Programs of the derivatives in the equations of motion, recorded from the program of a Lagrangian's value.
 
 use super::Request;
 use super::elimination::Lists;
@@ -6,7 +6,7 @@ use crate::scalar::{Real, Scalar};
 use crate::tape::{Depth, Directions, Program, ROWS, TANGENTS, Tracer};
 use alloc::vec::Vec;
 
-/// The derivatives of a Lagrangian at a state that is being recorded.
+/// The derivatives of a Lagrangian at a traced state.
 pub(super) struct Recorded<'t, S> {
     pub value: Tracer<'t, S>,
     pub momentum: Vec<Tracer<'t, S>>,
@@ -16,7 +16,7 @@ pub(super) struct Recorded<'t, S> {
     pub coriolis: Vec<Tracer<'t, S>>,
 }
 
-/// The derivatives that are needed; `None` if they are too many.
+/// Records the needed derivatives; returns `None` if there are too many.
 pub(super) fn derivatives<'t, S: Scalar>(
     value: &Program<S>,
     state: &[Tracer<'t, S>],
@@ -24,7 +24,7 @@ pub(super) fn derivatives<'t, S: Scalar>(
     need: Request,
 ) -> Option<Recorded<'t, S>> {
     let n = state.len() / 2;
-    // Velocities move along directions of their own, and all coordinates along `(v, 0)`.
+    // Each velocity has a separate direction, and all coordinates move along `(v, 0)`.
     let seed = |input: usize| match input.checked_sub(n) {
         Some(i) => vec![(i as u32, Tracer::one())],
         None => vec![(n as u32, state[n + input])],
@@ -47,7 +47,7 @@ pub(super) fn derivatives<'t, S: Scalar>(
     Some(Recorded { value: found.value, momentum, dl_dq: found.first, mass_matrix, coriolis })
 }
 
-/// The program of the needed terms, in the order of `L`, `p`, `g`, `M`, `c`; `None` if it is too large.
+/// Records the program of the needed terms, in the order `L`, `p`, `g`, `M`, `c`; returns `None` if it is too large.
 pub(super) fn program_of_terms<S: Scalar>(value: &Program<S>, need: Request) -> Option<Program<S>> {
     let n = value.inputs() / 2;
     let record = Program::record_within(ROWS, (2 * n, value.parameters()), |state, parameters| {

@@ -1,14 +1,14 @@
-//! The motion of a model as a system of first order, for solvers of other crates.
+//! The motion of a model as a first-order system, for solvers of other crates.
 
 use super::{Accelerations, EulerLagrange, Linearizer, MechanicsError};
 use crate::platform::{Mutex, MutexGuard, lock};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// The right-hand side of `dy/dt = f(y)`, `y = (q, v)`, `f = (v, a)`, `2 n` numbers, for solvers of differential equations.
+/// The right-hand side of `dy/dt = f(y)` with `y = (q, v)` and `f = (v, a)`, `2 n` numbers, for solvers of differential equations.
 ///
-/// Solvers do not allow a right-hand side to fail. Instead its first error is kept, and `dy` is `NaN` from then on, which stops them. It
-/// has its own buffers, and nothing is allocated after the first call.
+/// Solvers do not allow a right-hand side to fail. Therefore the first error is stored, and `dy` is `NaN` from then on, which stops them.
+/// Nothing is allocated after the first call.
 ///
 /// ```
 /// use lnn::lagrangian::{EulerLagrange, build};
@@ -31,15 +31,15 @@ pub struct RightHandSide<'a, S: Scalar> {
 
 struct Buffers<'a, S: Scalar> {
     accelerations: Accelerations<'a, S>,
-    /// Made on first use.
+    /// Created on first use.
     linearizer: Option<Linearizer<'a, S>>,
-    /// State of the last linearization: solvers request one product after the other.
+    /// State of the last linearization, which is reused, since solvers request several products at one state.
     place: Vec<S>,
     error: Option<MechanicsError>,
 }
 
 impl<'a, S: Scalar> RightHandSide<'a, S> {
-    /// The right-hand side of a model; [`EulerLagrange::rhs`] is the same.
+    /// Wraps a model; [`EulerLagrange::rhs`] does the same.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
         let buffers =
             Buffers { accelerations: Accelerations::new(model), linearizer: None, place: Vec::new(), error: None };
@@ -103,7 +103,7 @@ impl<'a, S: Scalar> RightHandSide<'a, S> {
         });
     }
 
-    /// Hands over `n`, `da/dq` and `da/dv`; keeps an error.
+    /// Calls `take` with `n`, `da/dq` and `da/dv`; stores an error.
     fn linearized(&self, y: &[S], take: impl FnOnce(usize, &[S], &[S]) -> Result<(), MechanicsError>) {
         let (mut buffers, n) = (self.lock(), self.model.coordinates());
         if buffers.error.is_some() {
@@ -125,7 +125,7 @@ impl<'a, S: Scalar> RightHandSide<'a, S> {
         buffers.error = found.err();
     }
 
-    /// Whether all calls succeeded since the last look; forgets the error.
+    /// Reports whether all calls have succeeded since the last call of this method, and clears the error.
     ///
     /// # Errors
     /// The first error.

@@ -1,4 +1,4 @@
-//! Facts about a hand-written system apart from its Lagrangian.
+//! Properties of a hand-written system apart from its Lagrangian.
 
 use super::Lagrangian;
 use super::description::ShownLink;
@@ -14,20 +14,20 @@ use serde::{Deserialize, Serialize};
 /// A coordinate of a system.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Coordinate {
-    /// Name, also of its CSV column; the velocity's column is the name and `_dot`.
+    /// Name, also of its CSV column; the velocity's column adds `_dot`.
     pub name: Cow<'static, str>,
     /// Unit of the coordinate; velocities are in this unit per [`System::time_unit`].
     pub unit: Cow<'static, str>,
-    /// An angle: adding `2 pi` changes nothing.
+    /// `true` for an angle, for which values that differ by `2 pi` are equal.
     pub periodic: bool,
 }
 
 impl Coordinate {
-    /// A periodic angle in radians.
+    /// Returns a periodic angle in radians.
     pub(crate) fn angle(name: impl Into<Cow<'static, str>>) -> Self {
         Self { name: name.into(), unit: Cow::Borrowed("rad"), periodic: true }
     }
-    /// A length in metres.
+    /// Returns a length in metres.
     pub(crate) fn length(name: impl Into<Cow<'static, str>>) -> Self {
         Self { name: name.into(), unit: Cow::Borrowed("m"), periodic: false }
     }
@@ -36,20 +36,20 @@ impl Coordinate {
 /// A physical constant of a system.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Parameter {
-    /// The paper's symbol.
+    /// Symbol as in the paper.
     pub symbol: Cow<'static, str>,
-    /// Default as decimal text, read in the working precision.
+    /// Default value as decimal text, which is parsed in the working precision.
     pub default: Cow<'static, str>,
     /// Unit.
     pub unit: Cow<'static, str>,
     /// Allowed values.
     pub range: Range,
-    /// `true` if its value is to be found by the training.
+    /// `true` if training determines its value.
     pub learn: bool,
 }
 
 impl Parameter {
-    /// A constant whose value is known.
+    /// Returns a constant whose value is known.
     pub(crate) const fn new(symbol: &'static str, default: &'static str, unit: &'static str, range: Range) -> Self {
         let (symbol, default, unit) = (Cow::Borrowed(symbol), Cow::Borrowed(default), Cow::Borrowed(unit));
         Self { symbol, default, unit, range, learn: false }
@@ -59,41 +59,41 @@ impl Parameter {
 /// Number of coordinates of a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
-    /// Always the same.
+    /// A fixed number.
     Fixed(usize),
-    /// Chosen by an integer parameter.
+    /// A number chosen by an integer parameter.
     Chosen {
         /// Symbol of the parameter.
         symbol: &'static str,
-        /// Its default.
+        /// Its default value.
         default: usize,
         /// Smallest value.
         least: usize,
         /// Largest value.
         most: usize,
-        /// The arrangement of that many parts: along a line or in a net.
+        /// The arrangement of the parts: in a line or in a net.
         layout: Layout,
     },
 }
 
-/// How many coordinates a chosen integer gives.
+/// How the number of coordinates follows from the chosen integer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
-    /// A line: as many.
+    /// In a line: the integer itself.
     Line,
-    /// A square net of points in space, the integer along each side: three times its square.
+    /// In a square net of points in space with this many points per side: three times the square of the integer.
     Net,
 }
 
 impl Layout {
-    /// Coordinates of the chosen integer.
+    /// Returns the number of coordinates for the chosen integer.
     const fn coordinates(self, chosen: usize) -> usize {
         match self {
             Self::Line => chosen,
             Self::Net => 3 * chosen * chosen,
         }
     }
-    /// The integer that gives this number of coordinates.
+    /// Returns the integer that gives this number of coordinates.
     pub const fn chosen(self, coordinates: usize) -> usize {
         match self {
             Self::Line => coordinates,
@@ -103,14 +103,14 @@ impl Layout {
 }
 
 impl Size {
-    /// The number of coordinates unless chosen otherwise.
+    /// Returns the default number of coordinates.
     pub const fn default(self) -> usize {
         match self {
             Self::Fixed(n) => n,
             Self::Chosen { default, layout, .. } => layout.coordinates(default),
         }
     }
-    /// The number of coordinates if this integer, which is within the bounds, is chosen.
+    /// Returns the number of coordinates for this integer, which must be within the bounds.
     pub const fn coordinates(self, chosen: usize) -> usize {
         match self {
             Self::Fixed(n) => n,
@@ -122,58 +122,58 @@ impl Size {
 /// A box of states: `(low, high)` per coordinate, in the system's units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
-    /// Of the coordinates.
+    /// Bounds of the coordinates.
     pub positions: Vec<(f64, f64)>,
-    /// Of the velocities.
+    /// Bounds of the velocities.
     pub velocities: Vec<(f64, f64)>,
 }
 
 impl Bounds {
-    /// The same bounds for each of `n` coordinates.
+    /// Returns the same bounds for each of `n` coordinates.
     pub fn uniform(n: usize, position: (f64, f64), velocity: (f64, f64)) -> Self {
         Self { positions: vec![position; n], velocities: vec![velocity; n] }
     }
 }
 
-/// The paper's trajectory test of a system.
+/// The trajectory test of a system, as in the paper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryTest {
-    /// Box of the random starts.
+    /// Box of the random initial states.
     pub start: Bounds,
-    /// End of the time span that starts at 0, in [`System::time_unit`].
+    /// End of the time span, which starts at 0, in [`System::time_unit`].
     pub t_end: f64,
-    /// Step of the output, in [`System::time_unit`].
+    /// Output step, in [`System::time_unit`].
     pub dt: f64,
 }
 
-/// Rejects coordinates outside a chart, given the parameters, with the violated condition.
+/// Checks that coordinates are inside the chart, given the parameters; the error states the violated condition.
 pub(crate) type Domain = fn(parameters: &[f64], q: &[f64]) -> Result<(), &'static str>;
 
-/// A plane in which a picture shows the position of a system in space, rather than its coordinates.
+/// A plane in which plots show the position of a system in space instead of its coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
     /// Labels of the horizontal and the vertical axis, with units.
     pub labels: [&'static str; 2],
-    /// `(x, y)` from the values of [`System::parameters`] and `n` coordinates. Finite wherever both are finite and the
-    /// result fits the number type; `NaN` for a wrong number of parameters. A point of a body of fixed size stays within
-    /// that size: `x^2 + y^2 <= (sum of the rods)^2` for a chain of pendula, `R^2` on a sphere.
+    /// Computes `(x, y)` from the values of [`System::parameters`] and `n` coordinates. The result is finite if the arguments are finite
+    /// and it fits the number type; it is `NaN` for a wrong number of parameters. Points of a body of fixed size stay within that size:
+    /// `x^2 + y^2 <= (sum of the rods)^2` for a chain of pendula, `R^2` on a sphere.
     pub point: fn(parameters: &[f64], q: &[f64]) -> (f64, f64),
 }
 
-/// Components of a vector at a state, given the parameters.
+/// Computes the components of a vector at a state, given the parameters.
 pub type Vector = fn(parameters: &[f64], q: &[f64], v: &[f64]) -> Vec<f64>;
 
-/// Quantity that exact motion conserves besides its energy.
+/// A quantity besides the energy that exact motion conserves.
 #[derive(Clone, Copy, Debug)]
 pub struct Conserved {
     /// Name, with unit.
     pub name: &'static str,
-    /// Components of the conserved vector at a state, from the values of [`System::parameters`]; never all zero on a
-    /// motion of interest. `NaN` for a wrong number of parameters.
+    /// Computes the components of the conserved vector at a state from the values of [`System::parameters`]. They are never all zero for a
+    /// motion of interest, and `NaN` for a wrong number of parameters.
     pub vector: Vector,
 }
 
-/// Property that depends on the number of coordinates of a system.
+/// A property that depends on the number of coordinates of a system.
 #[derive(Clone, Debug)]
 pub(crate) enum PerSize<T> {
     /// A rule for any number of coordinates.
@@ -183,7 +183,7 @@ pub(crate) enum PerSize<T> {
 }
 
 impl<T: Clone> PerSize<T> {
-    /// For `n` coordinates.
+    /// Returns the property for `n` coordinates.
     fn of(&self, n: usize) -> T {
         match self {
             Self::Rule(rule) => rule(n),
@@ -195,11 +195,11 @@ impl<T: Clone> PerSize<T> {
 /// Advice on learning a system from states with their accelerations.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LearningAdvice {
-    /// States to learn from, where the box of the training states alone does not do.
+    /// Training states, if the box of the training states is not suitable.
     pub states: Option<fn(bounds: &mut Bounds) -> StateAdvice>,
-    /// The paper's budget, if the system is one of the paper's.
+    /// The budget in the paper, if the paper covers the system.
     pub paper: Option<PaperBudget>,
-    /// Learning rate of a structure, if the default is not good.
+    /// Learning rate for structured networks, if the default is not suitable.
     pub structure_rate: Option<f64>,
 }
 
@@ -208,36 +208,36 @@ impl LearningAdvice {
     pub const NONE: Self = Self { states: None, paper: None, structure_rate: None };
 }
 
-/// Choices that go with the bounds of the training states.
+/// Settings that belong to the bounds of the training states.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StateAdvice {
-    /// Coordinates for which half of the values are drawn uniform in their logarithm; empty for none.
+    /// Coordinates for which half of the values are drawn uniformly in their logarithm; may be empty.
     pub log_uniform: Vec<bool>,
-    /// Accelerations above this multiple of the mean have relative residuals; 0 for none.
+    /// Accelerations above this multiple of the mean are weighted by relative residuals; 0 disables this.
     pub acceleration_weighting: f64,
-    /// Share of the states that lie along motions of the trajectory test.
+    /// Fraction of the states that lie along motions of the trajectory test.
     pub trajectory_fraction: f64,
-    /// Shell around a centre whose states are drawn instead of those of a box.
+    /// Shell around a centre from which states are drawn instead of a box.
     pub shell: Option<ShellAdvice>,
 }
 
-/// The paper's budget for a system.
+/// The training budget of the paper for a system.
 #[derive(Clone, Copy, Debug)]
 pub struct PaperBudget {
     /// Training states.
     pub states: usize,
     /// Widths of the hidden layers.
     pub hidden: &'static [usize],
-    /// Phases of the schedule.
+    /// Phases of the training schedule.
     pub phases: &'static [PaperPhase],
 }
 
-/// A phase of the paper's schedule.
+/// A phase of the training schedule.
 #[derive(Clone, Copy, Debug)]
 pub struct PaperPhase {
     /// Epochs.
     pub epochs: usize,
-    /// Learning rate at the start.
+    /// Initial learning rate.
     pub rate: f64,
     /// Lowest learning rate.
     pub lowest_rate: f64,
@@ -246,14 +246,13 @@ pub struct PaperPhase {
 }
 
 impl PaperPhase {
-    /// A phase over the box of the training states.
+    /// Returns a phase over the box of the training states.
     pub const fn new(epochs: usize, rate: f64, lowest_rate: f64) -> Self {
         Self { epochs, rate, lowest_rate, positions: None }
     }
 }
 
-/// Knowledge about a system: an entry of the catalogue, or a
-/// user's [description](super::Description).
+/// Properties of a system, either from the catalogue or from a user's [description](super::Description).
 #[derive(Clone, Debug)]
 pub struct System {
     /// Name on the command line.
@@ -264,87 +263,87 @@ pub struct System {
     pub size: Size,
     /// Coordinates, in order.
     pub(crate) coordinates: PerSize<Vec<Coordinate>>,
-    /// Constants, in the order the Lagrangian takes them; [`Size::Chosen`] adds one more.
+    /// Constants, in the order of the Lagrangian's parameters; [`Size::Chosen`] adds one more.
     pub parameters: Cow<'static, [Parameter]>,
     /// Unit of the evolution parameter: `s`, or `m` for proper time in geometric units (`G = c = 1`, where times and
     /// masses are lengths).
     pub time_unit: Cow<'static, str>,
-    /// The coordinate that is a time (Lorentzian systems).
+    /// The time-like coordinate of a Lorentzian system.
     pub time_like: Option<usize>,
-    /// The mass shell `g(v, v) = -1` solved for the velocity of the time-like coordinate, in words of the columns;
-    /// [`ClosedForm::constrained_velocity`] is the formula.
+    /// The mass shell `g(v, v) = -1` solved for the velocity of the time-like coordinate, as text with the names of the columns;
+    /// [`ClosedForm::constrained_velocity`] computes it.
     pub constraint: Option<&'static str>,
     /// Box of the training states.
     pub(crate) training: PerSize<Bounds>,
-    /// Box of the states on which errors are stated.
+    /// Box of the states at which errors are reported.
     pub(crate) validation: PerSize<Bounds>,
     /// Trajectory test.
     pub(crate) trajectory: PerSize<TrajectoryTest>,
-    /// Domain of the coordinates; the error states the condition.
+    /// Checks the domain of the coordinates; the error states the condition.
     pub(crate) domain: Option<Domain>,
-    /// Its position in a plane; `None` for systems of one coordinate, where a plot over time suffices.
+    /// Position in a plane; `None` for systems of one coordinate, which are plotted over time.
     #[doc(hidden)]
     pub plane: Option<Plane>,
-    /// Quantity that is conserved besides the energy, if there is one.
+    /// Conserved quantity besides the energy, if there is one.
     #[doc(hidden)]
     pub conserved: Option<Conserved>,
-    /// Advice on learning it.
+    /// Advice on training.
     #[doc(hidden)]
     pub learning: LearningAdvice,
-    /// The description with its Lagrangian, for a system that is not in the catalogue.
+    /// The compiled description of a system that is not in the catalogue.
     #[doc(hidden)]
     pub described: Option<Arc<Described>>,
 }
 
 impl System {
-    /// The description that the system was made from; none for a system of the catalogue.
+    /// Returns the description of the system; `None` for a system of the catalogue.
     pub fn description(&self) -> Option<&Description> {
         self.described.as_deref().map(|described| &described.description)
     }
-    /// The original description, with other values of parameters, by name; none for a system of the catalogue.
+    /// Returns the original description with other values of parameters, by name; `None` for a system of the catalogue.
     pub fn with_defaults(&self, values: &[(&str, f64)]) -> Option<Description> {
         self.described.as_deref().map(|described| described.with_defaults(values))
     }
-    /// `true` for links, a chain or a tree.
+    /// Returns `true` if the system was written as links, in a chain or a tree.
     pub fn is_chain(&self) -> bool {
         self.described.as_ref().is_some_and(|described| described.is_chain())
     }
-    /// Its links as one can show them.
+    /// Returns its links for display.
     #[doc(hidden)]
     pub fn shown_links(&self) -> Vec<ShownLink<'_>> {
         self.described.as_ref().map_or_else(Vec::new, |described| described.shown_links())
     }
-    /// Number of its links.
+    /// Returns the number of its links.
     pub fn links(&self) -> usize {
         self.described.as_ref().map_or(0, |described| described.links())
     }
-    /// Coordinates, in order, of the system of `n` coordinates.
+    /// Returns the coordinates, in order, of the system of `n` coordinates.
     pub fn coordinates(&self, n: usize) -> Vec<Coordinate> {
         self.coordinates.of(n)
     }
-    /// Box of the training states of `n` coordinates.
+    /// Returns the box of the training states of `n` coordinates.
     pub fn training(&self, n: usize) -> Bounds {
         self.training.of(n)
     }
-    /// Box of the states of `n` coordinates on which errors are stated.
+    /// Returns the box of the states of `n` coordinates at which errors are reported.
     pub fn validation(&self, n: usize) -> Bounds {
         self.validation.of(n)
     }
-    /// Trajectory test of `n` coordinates.
+    /// Returns the trajectory test of `n` coordinates.
     pub fn trajectory(&self, n: usize) -> TrajectoryTest {
         self.trajectory.of(n)
     }
-    /// Names of the columns of a state of `n` coordinates: coordinates, then velocities (`theta1_dot`).
+    /// Returns the column names of a state of `n` coordinates: coordinates, then velocities (`theta1_dot`).
     pub fn columns(&self, n: usize) -> Vec<String> {
         let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.name.to_string());
         positions.chain(coordinates.iter().map(|c| format!("{}_dot", c.name))).collect()
     }
-    /// These columns with their units (`theta1_dot [rad/s]`), as labels of axes.
+    /// Returns the column names with units (`theta1_dot [rad/s]`) as labels of axes.
     pub fn labels(&self, n: usize) -> Vec<String> {
         self.columns(n).iter().zip(self.units(n)).map(|(column, unit)| format!("{column} [{unit}]")).collect()
     }
-    /// Units of these columns (`rad`, `rad/s`).
+    /// Returns the units of these columns (`rad`, `rad/s`).
     pub fn units(&self, n: usize) -> Vec<String> {
         let coordinates = self.coordinates(n);
         let positions = coordinates.iter().map(|c| c.unit.to_string());
@@ -354,19 +353,19 @@ impl System {
     }
 }
 
-/// A Lagrangian with a closed-form acceleration to compare with.
+/// A Lagrangian with a closed-form acceleration for comparison.
 pub trait ClosedForm: Lagrangian {
-    /// `a(q, v)`, written down without differentiating the Lagrangian.
+    /// Computes `a(q, v)` from a formula, without differentiating the Lagrangian.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R>;
 
-    /// The velocity of the time-like coordinate that puts a state on the mass shell `g(v, v) = -1`, pointing to the
-    /// future; whatever `v` holds in its place is not read. `None` for a system without constraint.
+    /// Computes the velocity of the time-like coordinate that puts a state on the mass shell `g(v, v) = -1`, pointing to the future; its
+    /// element of `v` is ignored. Returns `None` for a system without constraint.
     fn constrained_velocity<R: Real>(&self, _parameters: &[R], _q: &[R], _v: &[R]) -> Option<R> {
         None
     }
 }
 
-/// Values a parameter may take, besides being finite.
+/// Allowed values of a parameter, which must also be finite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub enum Range {
@@ -383,7 +382,7 @@ pub enum Range {
 }
 
 impl Range {
-    /// The condition in words.
+    /// Returns the condition in words.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Any => "finite",
@@ -398,7 +397,7 @@ impl Range {
 pub struct ShellAdvice {
     /// Cartesian coordinates around the centre.
     pub coordinates: Cow<'static, [usize]>,
-    /// Lowest and highest distance from it.
+    /// Smallest and largest distance from the centre.
     pub radius: (f64, f64),
     /// Largest rapidity in a local frame.
     pub rapidity: f64,

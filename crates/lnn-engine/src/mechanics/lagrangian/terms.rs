@@ -10,10 +10,10 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::BitOr;
 
-/// Which terms a caller needs; nothing else is computed.
+/// The terms that a caller needs; others are not computed.
 ///
-/// Requests combine with `|`. Asking for [`Request::ACCELERATION`] computes `M`, `c`, `g` and `Q` on the way and stores
-/// them, [`Request::ENERGY`] stores `L` and `p`. The default asks for nothing.
+/// Requests combine with `|`. [`Request::ACCELERATION`] also computes and stores `M`, `c`, `g` and `Q`, and [`Request::ENERGY`] stores `L`
+/// and `p`. The default requests nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Request(u16);
 
@@ -28,28 +28,28 @@ impl Request {
     pub const MASS_MATRIX: Self = Self(8);
     /// `c = (d2L/dv dq) v`.
     pub const CORIOLIS: Self = Self(16);
-    /// `a = M^-1 (g - c + Q)`, with `M`, `c`, `g`, `Q`; under constraints with `A`, `gamma`, multipliers and their force.
+    /// `a = M^-1 (g - c + Q)`, with `M`, `c`, `g`, `Q`; with constraints also `A`, `gamma`, multipliers and their force.
     pub const ACCELERATION: Self = Self(256 | 128 | 32 | 16 | 8 | 4);
     /// `E = p.v - L`, with `L`, `p`.
     pub const ENERGY: Self = Self(64 | 2 | 1);
-    /// Forces `Q` that do not follow from `L`, such as friction, and the power they take; nothing for a model without.
+    /// Forces `Q` that do not follow from `L`, such as friction, and the power they dissipate; empty for a model without them.
     pub const FORCE: Self = Self(128);
-    /// The rows `A` of constraints and their drift `gamma`; nothing for a model without.
+    /// The rows `A` of constraints and their drift `gamma`; empty for a model without them.
     pub const CONSTRAINTS: Self = Self(256);
-    /// Everything.
+    /// All terms.
     pub const ALL: Self = Self(511);
 
-    /// This request without the solution for the acceleration; its ingredients stay.
+    /// Returns this request without the solution for the acceleration, but with the terms that the solution needs.
     pub(crate) const fn without_solution(self) -> Self {
         Self(self.0 & !32)
     }
 
-    /// A number below 32 that names the combination of `L`, `p`, `g`, `M`, `c`.
+    /// Returns a number below 32 that identifies the combination of `L`, `p`, `g`, `M`, `c`.
     pub(crate) const fn index(self) -> usize {
         (self.0 & 31) as usize
     }
 
-    /// The least depth of an evaluation that fills `L`, `p`, `g`, `M`, `c` as requested.
+    /// Returns the smallest depth of an evaluation that fills `L`, `p`, `g`, `M`, `c` as requested.
     pub(crate) const fn depth(self) -> Depth {
         if self.includes(Self::CORIOLIS) {
             Depth::Motion
@@ -62,7 +62,7 @@ impl Request {
         }
     }
 
-    /// `true` if all of `other` is requested.
+    /// Returns `true` if all of `other` is requested.
     #[inline]
     pub const fn includes(self, other: Self) -> bool {
         self.0 & other.0 == other.0
@@ -76,7 +76,7 @@ impl BitOr for Request {
     }
 }
 
-/// Euler-Lagrange terms of `batch` states; a field is filled if it was requested and empty otherwise.
+/// Euler-Lagrange terms of `batch` states. A field is filled if it was requested and empty otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct Terms<S> {
     /// `L`, `(batch)`.
@@ -92,29 +92,29 @@ pub struct Terms<S> {
     /// Generalized force `Q` that is not in `L`: friction `-dD/dv` for a dissipation `D`, `(batch, n)`; empty for a model that [conserves
     /// its energy](EulerLagrange::conserves_energy).
     pub force: Vec<S>,
-    /// Power that leaves the motion: the power of `Q`, `-v.Q = v.dD/dv`, and `dL/dt` of a Lagrangian that depends on the time; `(batch)`,
-    /// in the unit of `L` per unit of time; empty as `force`.
+    /// Power that leaves the motion, `(batch)`, in the unit of `L` per unit of time: `-v.Q = v.dD/dv`, plus `dL/dt` for a Lagrangian that
+    /// depends on the time. It is empty whenever `force` is.
     pub dissipation: Vec<S>,
     /// `a = M^-1 (g - c + Q + A^T lambda)`, `(batch, n)`.
     pub acceleration: Vec<S>,
     /// `E = p.v - L`, `(batch)`.
     pub energy: Vec<S>,
-    /// Number of constraints `m` of each state; 0 for a model without, whose fields of constraints are empty.
+    /// Number of constraints `m` of each state; 0 for a model without constraints, whose constraint fields are empty.
     pub constraints: usize,
     /// `A`, `(batch, m, n)`.
     pub constraint_matrix: Vec<S>,
     /// `gamma = (dA/dt) v - db/dt`, `(batch, m)`.
     pub constraint_drift: Vec<S>,
-    /// Multipliers `lambda`, `(batch, m)`, with the acceleration.
+    /// Multipliers `lambda`, `(batch, m)`; computed with the acceleration.
     pub multipliers: Vec<S>,
-    /// Forces of constraint `A^T lambda`, `(batch, n)`, with the acceleration.
+    /// Forces of constraint `A^T lambda`, `(batch, n)`; computed with the acceleration.
     pub constraint_force: Vec<S>,
     /// One error for every row that failed, in the order of the rows; [`EulerLagrange::terms`] returns the first.
     pub failures: Vec<MechanicsError>,
 }
 
 impl<S: Scalar> Terms<S> {
-    /// Copies the requested fields of the rows `rows` of a batch of `n` coordinates; the others are emptied.
+    /// Copies the requested fields of the rows `rows` of a batch of `n` coordinates, and clears the others.
     #[cfg(feature = "rollout")]
     pub(crate) fn copy_rows(&mut self, batch: &Self, n: usize, rows: core::ops::Range<usize>, request: Request) {
         let copy = |to: &mut Vec<S>, from: &[S], width: usize, what: Request| {
@@ -146,7 +146,7 @@ impl<S: Scalar> Terms<S> {
     }
 }
 
-/// One field of the terms that a model computes.
+/// Computes one field of the terms of a model.
 fn field<S: Scalar>(
     compute: &mut dyn FnMut(&mut Terms<S>) -> Result<(), MechanicsError>,
     field: fn(Terms<S>) -> Vec<S>,
@@ -156,9 +156,9 @@ fn field<S: Scalar>(
     Ok(field(terms))
 }
 
-/// A Lagrangian in motion: one written down or learned, with values for its parameters, in physical units.
+/// A mechanical model in physical units: a Lagrangian written by hand or learned, with values of its parameters.
 ///
-/// Two methods make a model: [`coordinates`](Self::coordinates) and [`terms`](Self::terms). A type that wraps another model adds
+/// Only two methods are required: [`coordinates`](Self::coordinates) and [`terms`](Self::terms). A type that wraps another model adds
 /// [`inner`](Self::inner), and every other method then delegates to that model. The trait is object safe: roll-outs, evaluations and
 /// reports take `&dyn EulerLagrange<S>`.
 ///
@@ -172,21 +172,21 @@ fn field<S: Scalar>(
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait EulerLagrange<S: Scalar>: Send + Sync {
-    /// Number of coordinates `n`.
+    /// Returns the number of coordinates `n`.
     fn coordinates(&self) -> usize;
 
     /// Computes the requested terms of a batch.
     ///
-    /// `q` and `v` are `(batch, n)` in physical units. `terms` is resized; its buffers are reused.
+    /// `q` and `v` are `(batch, n)` in physical units. `terms` is resized, and its buffers are reused.
     ///
     /// # Errors
-    /// [`MechanicsError`] naming the first row that fails; [`Terms::failures`] holds an error for each of them. Terms other than the
-    /// acceleration are filled even when a mass matrix is singular, and the accelerations of the other rows are right; those of
-    /// failed rows are `NaN`.
+    /// [`MechanicsError`] for the first row that fails; [`Terms::failures`] contains an error for each of them. Terms other than the
+    /// acceleration are filled even if a mass matrix is singular. Accelerations of failed rows are `NaN`; those of the other rows are
+    /// correct.
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError>;
 
-    /// As [`terms`](Self::terms), at times `t`, `(batch)`. Only a model that [depends on the time](Self::is_timed) needs them; it refuses
-    /// states without times.
+    /// Computes [`terms`](Self::terms) at times `t`, `(batch)`. Only a model that [depends on the time](Self::is_timed) needs them; it
+    /// rejects states without times.
     ///
     /// # Errors
     /// Those of [`terms`](Self::terms).
@@ -201,18 +201,18 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         self.terms(q, v, request, terms)
     }
 
-    /// `true` if the Lagrangian or its forces depend on the time, such as [`InTime`](super::InTime): a state alone has no terms.
+    /// Returns `true` if the Lagrangian or its forces depend on the time, as in [`InTime`](super::InTime), so that a state alone does not
+    /// determine the terms.
     fn is_timed(&self) -> bool {
         self.inner().is_some_and(|inner| inner.is_timed())
     }
 
-    /// The wrapped model of a wrapper. The methods below delegate to it, so that a wrapper cannot forget one of them; it overrides those
-    /// that it changes.
+    /// Returns the wrapped model of a wrapper. The methods below delegate to it, so that a wrapper only overrides those that it changes.
     fn inner(&self) -> Option<&dyn EulerLagrange<S>> {
         None
     }
 
-    /// Accelerations `a` of a batch, `(batch, n)`.
+    /// Computes the accelerations `a` of a batch, `(batch, n)`.
     ///
     /// # Errors
     /// Those of [`terms`](Self::terms).
@@ -220,7 +220,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         field(&mut |terms| self.terms(q, v, Request::ACCELERATION, terms), |terms| terms.acceleration)
     }
 
-    /// Mass matrices `M = d2L/dv dv` of a batch, `(batch, n, n)`.
+    /// Computes the mass matrices `M = d2L/dv dv` of a batch, `(batch, n, n)`.
     ///
     /// # Errors
     /// Those of [`terms`](Self::terms).
@@ -228,7 +228,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         field(&mut |terms| self.terms(q, v, Request::MASS_MATRIX, terms), |terms| terms.mass_matrix)
     }
 
-    /// Momenta `p = dL/dv` of a batch, `(batch, n)`.
+    /// Computes the momenta `p = dL/dv` of a batch, `(batch, n)`.
     ///
     /// # Errors
     /// Those of [`terms`](Self::terms).
@@ -236,7 +236,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         field(&mut |terms| self.terms(q, v, Request::MOMENTUM, terms), |terms| terms.momentum)
     }
 
-    /// Energies `E = p.v - L` of a batch, `(batch)`.
+    /// Computes the energies `E = p.v - L` of a batch, `(batch)`.
     ///
     /// # Errors
     /// Those of [`terms`](Self::terms).
@@ -244,7 +244,7 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         field(&mut |terms| self.terms(q, v, Request::ENERGY, terms), |terms| terms.energy)
     }
 
-    /// The motion as `dy/dt = f(y)`, `y = (q, v)`, for a solver of another crate.
+    /// Returns the motion as `dy/dt = f(y)`, `y = (q, v)`, for a solver of another crate.
     fn rhs(&self) -> RightHandSide<'_, S>
     where
         Self: Sized,
@@ -252,9 +252,9 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         RightHandSide::new(self)
     }
 
-    /// The metric `M = d2L/dv dv` of every state with its first and second derivatives by the coordinates, exact to rounding.
+    /// Computes the metric `M = d2L/dv dv` of every state with its first and second derivatives by the coordinates, exact to rounding.
     ///
-    /// `q` and `v` are `(batch, n)` in physical units. Numbers that are not finite are passed on.
+    /// `q` and `v` are `(batch, n)` in physical units. Results may contain numbers that are not finite.
     ///
     /// # Errors
     /// [`MechanicsError::Shape`]; [`MechanicsError::Derivatives`] for a model that cannot be differentiated: one that branches on its data,
@@ -266,49 +266,50 @@ pub trait EulerLagrange<S: Scalar>: Send + Sync {
         }
     }
 
-    /// The metric jets in double-double numbers, if a model can give them at a reasonable cost: curvature is a difference of larger terms,
-    /// for example of flat space in curved coordinates. `None` for models that cannot, or are that precise themselves.
+    /// Computes the metric jets in double-double precision, if the cost is reasonable: curvature is a difference of larger terms, for
+    /// example for flat space in curved coordinates. Returns `None` if the model cannot do this or has that precision already.
     ///
     /// # Errors
-    /// As [`EulerLagrange::metric_jets`].
+    /// Those of [`EulerLagrange::metric_jets`].
     fn wide_metric_jets(&self, q: &[S], v: &[S]) -> Result<Option<Vec<MetricJet<Dd>>>, MechanicsError> {
         self.inner().map_or(Ok(None), |inner| inner.wide_metric_jets(q, v))
     }
 
-    /// Which second derivatives of the Lagrangian are zero and which are constant at all states; `None` for a model that is not recorded.
+    /// Returns which second derivatives of the Lagrangian are zero and which are constant at all states; `None` for a model that is not
+    /// recorded.
     fn pattern(&self) -> Option<Pattern> {
         self.inner().and_then(|inner| inner.pattern())
     }
 
-    /// The states that the constraints of the model allow; none for a model without constraints.
+    /// Returns the manifold of states that the constraints allow; `None` for a model without constraints.
     fn manifold(&self) -> Option<&dyn Manifold<S>> {
         self.inner().and_then(|inner| inner.manifold())
     }
 
-    /// `true` if the motion conserves the energy `E = p.v - L`: no friction and no other forces that are not in `L`.
+    /// Returns `true` if the motion conserves the energy `E = p.v - L`, that is, without friction and other forces that are not in `L`.
     fn conserves_energy(&self) -> bool {
         self.inner().is_none_or(|inner| inner.conserves_energy())
     }
 
-    /// The program of the accelerations alone, for [`Accelerations`](super::Accelerations); `None` if there is none.
+    /// Returns the program of the accelerations alone, for [`Accelerations`](super::Accelerations); `None` if there is none.
     #[doc(hidden)]
     fn solved(&self) -> Option<Solved<'_, S>> {
         None
     }
 
-    /// The derivatives of the equations of motion, for a [`Linearizer`](super::Linearizer); `None` if there are none.
+    /// Returns the derivatives of the equations of motion, for a [`Linearizer`](super::Linearizer); `None` if there are none.
     #[doc(hidden)]
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
         None
     }
 
-    /// The chain of links of the model, whose recursions serve [`Torques`](super::Torques); `None` for any other model.
+    /// Returns the chain of links of the model, whose recursions [`Torques`](super::Torques) uses; `None` for any other model.
     #[doc(hidden)]
     fn links(&self) -> Option<&Chain<S>> {
         None
     }
 
-    /// `true` if several states at once take much less time per state than one, by more than threads need to meet.
+    /// Returns `true` if evaluating several states at once takes less time per state, by more than the synchronization of threads costs.
     fn prefers_batches(&self) -> bool {
         self.inner().is_some_and(|inner| inner.prefers_batches())
     }
@@ -392,7 +393,7 @@ impl<S: Scalar> EulerLagrange<S> for &(dyn EulerLagrange<S> + '_) {
 mod tests {
     use super::*;
 
-    /// A model whose every method differs from the default.
+    /// A model that overrides every method.
     struct Odd;
 
     impl EulerLagrange<f64> for Odd {

@@ -1,12 +1,12 @@
-//! Forces for a motion by the recursion of a chain of links, and a handle that computes them state after state.
+//! Forces for a given motion, computed with the recursion of a chain of links, and a type that computes them state after state.
 
 use super::recursion::Passes;
 use super::{EulerLagrange, InverseDynamics, MechanicsError, inverse_dynamics};
 use crate::scalar::{Scalar, are_finite};
 use alloc::vec::Vec;
 
-/// The forces for accelerations at states `(batch, n)` by the recursion of a model. `None` for a model without one, and if a force is not
-/// finite or a slice has the wrong length; the terms then find the error.
+/// Computes the forces for accelerations at states `(batch, n)` with the recursion of a model. Returns `None` for a model without
+/// recursion, and if a force is not finite or a slice has the wrong length; the general method then reports the error.
 pub(super) fn recursive_forces<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     [q, v, a]: [&[S]; 3],
@@ -23,7 +23,7 @@ pub(super) fn recursive_forces<S: Scalar>(
     Some(InverseDynamics { generalized, friction, external, constraint: Vec::new(), multipliers: Vec::new() })
 }
 
-/// Writes the external forces for accelerations at states by the recursion of a model, if it has one; `true` if all are finite.
+/// Writes the external forces for accelerations at states with the recursion of a model, if it has one; returns `true` if all are finite.
 fn write_torques<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     [q, v, a]: [&[S]; 3],
@@ -44,11 +44,11 @@ fn write_torques<S: Scalar>(
     are_finite(torques)
 }
 
-/// The external forces for a motion, such as the torques of an arm's motors, state after state, with its own buffers, for use in a
-/// controller.
+/// Computes the external forces for a motion, such as the torques of an arm's motors, state after state with preallocated buffers, for use
+/// in a controller.
 ///
-/// They are those of [`inverse_dynamics`]. For a chain of links the recursive Newton-Euler method computes them, and nothing is allocated
-/// after the first call.
+/// The forces equal those of [`inverse_dynamics`]. For a chain of links they are computed by the recursive Newton-Euler method, and nothing
+/// is allocated after the first call.
 ///
 /// ```
 /// use lnn::lagrangian::{Torques, configure};
@@ -66,15 +66,15 @@ pub struct Torques<'a, S> {
 }
 
 impl<'a, S: Scalar> Torques<'a, S> {
-    /// Buffers for a model.
+    /// Allocates the buffers for a model.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
         Self { model, buffer: Passes::default() }
     }
 
-    /// The forces of states `q`, `v` with accelerations `a`, all `(batch, n)` in physical units.
+    /// Computes the forces at states `q`, `v` for accelerations `a`, all `(batch, n)` in physical units.
     ///
     /// # Errors
-    /// Those of [`inverse_dynamics`]; a wrong length of `torques`.
+    /// Those of [`inverse_dynamics`]; also if `torques` has the wrong length.
     pub fn at(&mut self, q: &[S], v: &[S], a: &[S], torques: &mut [S]) -> Result<(), MechanicsError> {
         if torques.len() != q.len() {
             return Err(MechanicsError::Shape { what: "torques", expected: q.len(), found: torques.len() });

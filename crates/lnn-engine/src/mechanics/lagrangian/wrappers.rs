@@ -1,5 +1,5 @@
-//! Models around a model: with forces that are not in its Lagrangian, generalized forces `Q(q, v)` or Rayleigh's dissipation, and with a
-//! flag that ends it.
+//! Wrappers of models: with forces that are not in the Lagrangian, that is, generalized forces `Q(q, v)` or Rayleigh dissipation; and with
+//! a flag that ends the motion.
 
 use super::linearization::{ProgramSlopes, Rate, SlopePrograms, add_jacobian, with_force};
 use super::{EulerLagrange, Manifold, MechanicsError, MetricJet, Request, Slopes, Solved, Terms};
@@ -10,14 +10,14 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Generalized forces that do not follow from a Lagrangian; closures `Fn(&[S], &[S], &mut [S])` of coordinates, velocities and
-/// forces are such.
+/// Generalized forces that do not follow from a Lagrangian; also implemented for closures `Fn(&[S], &[S], &mut [S])` of coordinates,
+/// velocities and forces.
 pub trait GeneralizedForce<S>: Send + Sync {
-    /// Writes `Q(q, v)` of one state; all three are of length `n`, in physical units (N, N m).
+    /// Writes `Q(q, v)` of one state; all three slices have length `n`, in physical units (N, N m).
     fn force(&self, q: &[S], v: &[S], force: &mut [S]);
 
-    /// Writes `dQ/dq` and `dQ/dv` of one state, `(n, n)` each, a row for each component of the force; by default central differences of
-    /// the fourth order, with errors of about `eps^(4/5)`.
+    /// Writes `dQ/dq` and `dQ/dv` of one state, `(n, n)` each, with a row for each component of the force. By default it uses central
+    /// differences of the fourth order, with errors of about `eps^(4/5)`.
     fn jacobian(&self, q: &[S], v: &[S], by_q: &mut [S], by_v: &mut [S])
     where
         S: Scalar,
@@ -27,7 +27,7 @@ pub trait GeneralizedForce<S>: Send + Sync {
         add_jacobian(self, (q, v), by_q, by_v);
     }
 
-    /// The derivatives for a [`Linearizer`](super::Linearizer), of a force that has more than [`jacobian`](Self::jacobian).
+    /// Returns the derivatives for a [`Linearizer`](super::Linearizer), for a force that provides more than [`jacobian`](Self::jacobian).
     #[doc(hidden)]
     fn slopes(&self, _coordinates: usize) -> Option<Box<dyn Slopes<S> + '_>>
     where
@@ -43,9 +43,9 @@ impl<S, F: Fn(&[S], &[S], &mut [S]) + Send + Sync> GeneralizedForce<S> for F {
     }
 }
 
-/// Rayleigh's dissipation function `D(q, v)` in W, half the power that linear friction takes; the force is `Q = -dD/dv`.
+/// Rayleigh's dissipation function `D(q, v)` in W, half of the power that linear friction dissipates; the force is `Q = -dD/dv`.
 pub trait Dissipation: Send + Sync {
-    /// `D(q, v)` of one state, `q` and `v` of length `n`.
+    /// Computes `D(q, v)` of one state, where `q` and `v` have length `n`.
     fn dissipation<R: Real>(&self, q: &[R], v: &[R]) -> R;
 }
 
@@ -55,7 +55,7 @@ impl<D: Dissipation> Dissipation for &D {
     }
 }
 
-/// Force `-dD/dv` of a [`Dissipation`] `D`, by exact derivatives.
+/// The force `-dD/dv` of a [`Dissipation`] `D`, computed with exact derivatives.
 #[derive(Clone, Copy, Debug)]
 pub struct Rayleigh<D>(
     /// The dissipation function.
@@ -104,22 +104,22 @@ impl<S: Scalar, D: Dissipation> GeneralizedForce<S> for Rayleigh<D> {
 pub struct WithForces<M, F> {
     model: M,
     force: F,
-    /// `false` if the force vanishes with the values that its parameters have.
+    /// `false` if the force is zero for the given values of its parameters.
     acts: bool,
 }
 
 impl<M, F> WithForces<M, F> {
-    /// The model under the force, a [`GeneralizedForce`].
+    /// Adds a [`GeneralizedForce`] to a model.
     pub fn new(model: M, force: F) -> Self {
         Self { model, force, acts: true }
     }
 
-    /// The model with a force that vanishes at its parameter values, unlike its derivatives by them.
+    /// Adds a force that is zero for the given values of its parameters, although its derivatives by them are not.
     pub(crate) fn vanishing(model: M, force: F) -> Self {
         Self { model, force, acts: false }
     }
 
-    /// The model without the force.
+    /// Returns the model without the force.
     pub fn model(&self) -> &M {
         &self.model
     }
@@ -135,7 +135,7 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
             return self.model.terms(q, v, request, terms);
         }
         let n = self.coordinates();
-        // The acceleration is solved for once, with all forces.
+        // The acceleration is solved for only once, with all forces.
         let outcome = self.model.terms(q, v, request.without_solution(), terms);
         let found = terms.drain_failures(outcome)?;
         if request.includes(Request::FORCE) {
@@ -173,9 +173,9 @@ impl<S: Scalar, M: EulerLagrange<S>, F: GeneralizedForce<S>> EulerLagrange<S> fo
     }
 }
 
-/// A model without its own friction: `M a = g - c + Q` with `Q = 0`, to compute its motion or torques without friction.
+/// A model without its friction: `M a = g - c + Q` with `Q = 0`, to compute its motion or torques without friction.
 ///
-/// It is linearized like your own types: by differences.
+/// It is linearized by differences, like your own types.
 #[derive(Clone, Copy)]
 pub struct Frictionless<'a, S>(
     /// The model.
@@ -215,15 +215,15 @@ impl<S: Scalar> EulerLagrange<S> for Frictionless<'_, S> {
     }
 }
 
-/// Wraps a model so that a flag ends its motion: once the flag is raised, every evaluation fails with [`MechanicsError::Interrupted`].
-/// The energy of given states is still returned.
+/// Wraps a model so that a flag ends its motion: once the flag is raised, every evaluation fails with [`MechanicsError::Interrupted`]. The
+/// energy of given states is still computed.
 pub struct Interruptible<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     flag: &'a AtomicBool,
 }
 
 impl<'a, S> Interruptible<'a, S> {
-    /// The model under a flag.
+    /// Wraps a model with a flag.
     pub fn new(model: &'a dyn EulerLagrange<S>, flag: &'a AtomicBool) -> Self {
         Self { model, flag }
     }

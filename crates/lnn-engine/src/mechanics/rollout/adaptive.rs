@@ -1,4 +1,4 @@
-//! Steps under error control, piece by piece where a force from outside is not smooth.
+//! Adaptive steps with error control, divided into pieces within which the external force is smooth.
 
 use super::crossing::{Dense, Found, Watcher};
 use super::force::{Piece, pieces};
@@ -22,9 +22,9 @@ struct MotionEquations<'a, S> {
     n: usize,
     /// `true` if the accelerations depend on the time, through the model or through an external force.
     timed: bool,
-    /// The model if they do not.
+    /// The model, if they do not.
     accelerations: Accelerations<'a, S>,
-    /// The terms of the model if they do.
+    /// The terms of the model, if they do.
     terms: Terms<S>,
     external: Vec<S>,
     workspace: Workspace<S>,
@@ -35,12 +35,12 @@ impl<S: Scalar> MotionEquations<'_, S> {
         self.options.t_end < self.options.t0
     }
 
-    /// The time when so much has elapsed.
+    /// Returns the time for an elapsed time.
     fn time(&self, elapsed: S) -> S {
         if self.backwards() { self.options.t0 - elapsed } else { self.options.t0 + elapsed }
     }
 
-    /// Derivative of `y = (q, v)` with respect to the elapsed time.
+    /// Computes the derivative of `y = (q, v)` by the elapsed time.
     fn derivative(&mut self, piece: &Piece<S>, elapsed: S, y: &[S], dy: &mut [S]) -> Result<(), StepFailure> {
         let n = self.n;
         StepFailure::check(self.options.domain.as_ref(), y)?;
@@ -68,7 +68,7 @@ impl<S: Scalar> MotionEquations<'_, S> {
     }
 }
 
-/// Integrates from `(q, v)` to the end of the options, or as far as possible; arguments are checked.
+/// Integrates from `(q, v)` to the end of the options, or as far as possible. The arguments must be checked before.
 pub(super) fn run<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -86,7 +86,7 @@ pub(super) fn run<S: Integrable>(
     (progress.total, outcome.err())
 }
 
-/// A motion as far as it has come.
+/// The current state of a motion.
 struct Progress<'a, S> {
     equations: MotionEquations<'a, S>,
     manifold: Option<&'a dyn Manifold<S>>,
@@ -97,16 +97,16 @@ struct Progress<'a, S> {
     /// Elapsed time and state.
     start: S,
     state: Vec<S>,
-    /// The next sample, and the size of the next step; 0 leaves it to the solver.
+    /// The index of the next sample, and the size of the next step; 0 lets the solver choose it.
     first: usize,
     first_step: S,
 }
 
 impl<'a, S: Integrable> Progress<'a, S> {
-    /// At the start `(q, v)`.
+    /// Starts a motion at `(q, v)`.
     ///
     /// # Errors
-    /// Events that the options do not allow.
+    /// The options do not allow an event.
     fn new(
         model: &'a dyn EulerLagrange<S>,
         force: Option<&'a dyn Force<S>>,
@@ -141,7 +141,7 @@ impl<'a, S: Integrable> Progress<'a, S> {
         })
     }
 
-    /// Integrates piece after piece, from event to event.
+    /// Integrates piece after piece, and from event to event.
     fn run(
         &mut self,
         cuts: &[Piece<S>],
@@ -159,7 +159,7 @@ impl<'a, S: Integrable> Progress<'a, S> {
         Ok(())
     }
 
-    /// The remaining samples of a piece, which is integrated to its end even if that is not a sample.
+    /// Returns the remaining samples of a piece, which is integrated to its end even if there is no sample at it.
     fn samples(&self, piece: &Piece<S>) -> Part<S> {
         let (all, first) = (self.all, self.first);
         let last = piece.end >= all.elapsed(all.len() - 1);
@@ -168,7 +168,7 @@ impl<'a, S: Integrable> Progress<'a, S> {
         Part { all, first, after, start: self.start, end }
     }
 
-    /// Integrates to the end of a piece, or to the first event within it that interrupts the motion, which is returned.
+    /// Integrates to the end of a piece, or to the first event that interrupts the motion, which is returned.
     fn advance(
         &mut self,
         piece: &Piece<S>,
@@ -230,10 +230,10 @@ impl<'a, S: Integrable> Progress<'a, S> {
         Ok(found.map(|(found, _)| found))
     }
 
-    /// Applies an event to the state; `true` if it ends the motion, whose last sample is then there.
+    /// Applies an event to the state; returns `true` if it ends the motion, after adding a last sample there.
     ///
     /// # Errors
-    /// An undetermined impact; a receiver that takes no more samples.
+    /// The impact is not determined, or the receiver accepts no more samples.
     fn is_ended_by(&mut self, found: Found<S>, keep: &mut Keep<'_, S>) -> Result<bool, RolloutError> {
         let t = self.equations.time(self.start);
         let Some(watcher) = &mut self.watcher else { return Ok(false) };
@@ -248,42 +248,42 @@ impl<'a, S: Integrable> Progress<'a, S> {
     }
 }
 
-/// Passes on the samples of a piece.
+/// Delivers the samples of a piece.
 struct Delivery<'a, S> {
     manifold: Option<&'a dyn Manifold<S>>,
     options: &'a RolloutOptions<S>,
     samples: Part<S>,
-    /// The sample on the constraints.
+    /// The sample projected onto the constraints.
     on: Vec<S>,
-    /// Samples delivered.
+    /// The number of delivered samples.
     next: usize,
     /// `true` until a sample is outside the domain or not finite.
     valid: bool,
 }
 
 impl<S: Scalar> Delivery<'_, S> {
-    /// Passes on sample `k` of the piece, at the state `y`; `false` if no more are accepted.
+    /// Delivers sample `k` of the piece at the state `y`; returns `false` if no more are accepted.
     fn deliver(&mut self, k: usize, y: &[S], keep: &mut Keep<'_, S>) -> bool {
         let n = y.len() / 2;
         self.next = k + 1;
         self.on.clear();
         self.on.extend_from_slice(y);
-        // Between two states it deviates by the error of the interpolation.
+        // Between steps, the interpolation error moves a sample off the constraints.
         if let Some(manifold) = self.manifold {
             let (q, v) = self.on.split_at_mut(n);
             self.valid &= project(manifold, q, v).is_ok();
         }
         let y = self.on.as_slice();
-        // An interpolated state may still cross a bound by less than the tolerance.
+        // The interpolation may exceed a bound by less than the tolerance.
         let is_outside = |domain: &Domain<S>| domain.violation(y).is_some();
         self.valid &= y.iter().all(|x| x.is_finite()) && !self.options.domain.as_ref().is_some_and(is_outside);
-        // The samples after an invalid one are dropped; the motion continues to its end.
+        // Samples after an invalid one are dropped, but the motion is integrated to the end of the piece.
         let Part { all, first, after, .. } = self.samples;
         !self.valid || first + k >= after || keep(all.time(first + k), &y[..n], &y[n..])
     }
 }
 
-/// Brings a state back to the constraints; returns how far that was, in the norm and the unit of the error of a step.
+/// Projects a state back onto the constraints; returns the distance in the norm and unit of the step error.
 fn returned<S: Scalar>(
     manifold: Option<&dyn Manifold<S>>,
     options: &RolloutOptions<S>,
@@ -299,7 +299,7 @@ fn returned<S: Scalar>(
     Ok(Real::sqrt(squares / S::of_f64(2.0 * n as f64)))
 }
 
-/// Why a piece ended before its time, if it did.
+/// Returns the reason why a piece ended early, if it did.
 fn stopped<S: Integrable>(
     motion: &mut MotionEquations<'_, S>,
     piece: &Piece<S>,
@@ -328,7 +328,7 @@ fn stopped<S: Integrable>(
     }
 }
 
-/// The error of a trajectory whose samples cross a bound that its steps respect: it is grazed within the tolerance.
+/// Returns the error for a trajectory whose samples exceed a bound within the tolerance, although its steps do not.
 fn left<S: Scalar>(domain: Option<&Domain<S>>, reached: &[S], t: f64, state: Vec<f64>) -> Option<RolloutError> {
     let (component, lower, upper) = domain?.violation(reached).or_else(|| domain?.tightest(reached))?;
     let (value, lower, upper) = (state[component], lower.to_f64(), upper.to_f64());

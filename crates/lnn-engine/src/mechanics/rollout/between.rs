@@ -1,33 +1,33 @@
-//! Forces between the samples at which they were recorded.
+//! Interpolation of forces between the samples at which they were recorded.
 
 use super::thresholds::AT_SAMPLE;
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 
-/// Known forces between the samples.
+/// How to interpolate known forces between their samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Between {
-    /// Each as it was at the sample before: zero-order hold, what a converter or a controller does.
+    /// Each value is held until the next sample (zero-order hold), as a converter or a controller does.
     Held,
-    /// On straight lines.
+    /// Linear interpolation.
     #[default]
     Linear,
-    /// On curves of the third degree, each through the four nearest samples: for forces that are smooth from sample to sample.
+    /// Cubic interpolation through the four nearest samples, for smooth forces.
     Cubic,
-    /// By the smooth curve without frequencies above half the rate of the samples: a windowed sum of `sin(x)/x`.
+    /// Band-limited interpolation, without frequencies above half the sampling rate: a windowed sum of `sin(x)/x`.
     BandLimited,
 }
 
-/// Samples to either side that a band-limited force is made of.
+/// Number of samples on either side that a band-limited interpolation uses.
 const REACH: isize = 8;
 
 impl Between {
-    /// All of them.
+    /// All kinds of interpolation.
     pub const ALL: [Self; 4] = [Self::Held, Self::Linear, Self::Cubic, Self::BandLimited];
 
-    /// Its name in options, results and files.
+    /// Returns its name in options, results and files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Held => "held",
@@ -37,7 +37,7 @@ impl Between {
         }
     }
 
-    /// What it is, in a few words.
+    /// Describes it in a few words.
     pub const fn about(self) -> &'static str {
         match self {
             Self::Held => "As they were at the sample before",
@@ -47,8 +47,8 @@ impl Between {
         }
     }
 
-    /// Hands over the samples, at ascending `times`, that make the value at the share `x` of the interval that ends at `sample`, each
-    /// with its weight. Beyond the ends the first and the last sample continue.
+    /// Calls the function with each sample that contributes to the value at the fraction `x` of the interval that ends at `sample`, and
+    /// with its weight; `times` are ascending. The first and the last sample are held beyond the ends.
     pub fn weigh<S: Scalar>(self, times: &[S], (sample, x): (usize, S), mut take: impl FnMut(usize, S)) {
         let (before, one) = (sample.saturating_sub(1), <S as Real>::one());
         let last = times.len() as isize - 1;
@@ -60,7 +60,7 @@ impl Between {
             }
             Self::Cubic => {
                 let first = (before as isize - 1).clamp(0, (last - 3).max(0));
-                // Samples at the same time form one node.
+                // Samples with the same time count as one node.
                 let is_new = |k: &isize| *k == first || times[*k as usize] > times[*k as usize - 1];
                 let nodes = (first..=(first + 3).min(last)).filter(is_new);
                 let now = times[before] + x * (times[sample] - times[before]);
@@ -94,7 +94,7 @@ impl Between {
 mod tests {
     use super::*;
 
-    /// The value of samples of a function half a second apart.
+    /// Interpolates samples of a function, half a second apart.
     fn value(between: Between, f: impl Fn(f64) -> f64, t: f64) -> f64 {
         let times: Vec<f64> = (0..40).map(|k| 0.5 * f64::from(k)).collect();
         let sample = times.partition_point(|known| *known <= t).clamp(1, 39);
@@ -112,7 +112,7 @@ mod tests {
             let cubic = |t: f64| 0.1 * t.powi(3) - t * t + 2.0;
             assert!((value(Between::Cubic, cubic, t) - cubic(t)).abs() < 1e-10 * cubic(t).abs().max(1.0));
         }
-        // Five samples a period: lines miss it by a quarter, the band-limited curve does not.
+        // With five samples per period, linear interpolation is wrong by a quarter, and the band-limited curve is accurate.
         let wave = |t: f64| (std::f64::consts::TAU * t / 2.5).sin();
         let worst = |between| {
             (160..240)

@@ -1,7 +1,7 @@
-//! Crossings of the zeros of events along a motion, step by step.
+//! Detects zero crossings of events along a motion, step by step.
 //!
-//! Every event knows the side of its zero that the motion is on. A step is sampled at equidistant places of its dense output; where
-//! the side changes, the crossing is refined. After an impact the motion stays on its side, so that the impact does not happen again.
+//! For every event, the watcher stores on which side of zero the motion is. The dense output of each step is sampled at equidistant points;
+//! where the side changes, the crossing is refined. After an impact the motion stays on its side, so that the impact is not detected again.
 
 use super::event::{Event, Occurrence};
 use super::impact::Flights;
@@ -10,32 +10,32 @@ use super::{RolloutError, RolloutOptions, StepFailure};
 use crate::lagrangian::{EulerLagrange, Terms};
 use crate::scalar::{Real, Scalar};
 
-/// The state `(q, v)` at a share of a step, from 0 to 1.
+/// Computes the state `(q, v)` at a fraction of a step, from 0 to 1.
 pub(super) type Dense<'a, S> = dyn FnMut(S, &mut [S]) + 'a;
-/// Writes the state at a share of a step as the method itself computes it.
+/// Computes the state at a fraction of a step with the integrator instead of interpolation.
 type Exact<'a, S> = dyn FnMut(S, &mut [S]) -> Result<(), StepFailure> + 'a;
 
 /// A crossing within a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Found<S> {
-    /// Which event.
+    /// Index of the event.
     pub(super) event: usize,
-    /// Shares of the step around it: before, and at or after.
+    /// Fractions of the step that enclose it: before, and at or after the crossing.
     pub(super) between: (S, S),
-    /// `true` if the number was above zero before it.
+    /// `true` if the value was positive before it.
     pub(super) above: bool,
 }
 
-/// The events of one motion.
+/// Watches the events of one motion.
 pub(super) struct Watcher<'a, S> {
     pub(super) model: &'a dyn EulerLagrange<S>,
     pub(super) events: &'a [Event<S>],
     backwards: bool,
-    /// Distance of samples.
+    /// Sampling interval.
     pub(super) dt: S,
-    /// Occurrences allowed.
+    /// Largest number of occurrences.
     pub(super) most: usize,
-    /// `true` above zero.
+    /// For each event, `true` if the value is positive; `None` at the start.
     pub(super) sides: Vec<Option<bool>>,
     /// The sides at the end of a step.
     pub(super) next: Vec<Option<bool>>,
@@ -51,7 +51,7 @@ pub(super) struct Watcher<'a, S> {
     pub(super) terms: Terms<S>,
 }
 
-/// The side of a number, if it is not zero.
+/// Returns the side of a number; `None` for zero.
 pub(super) fn side<S: Scalar>(value: S) -> Option<bool> {
     let zero = <S as Real>::zero();
     if value > zero {
@@ -63,8 +63,9 @@ pub(super) fn side<S: Scalar>(value: S) -> Option<bool> {
     }
 }
 
-/// Finds the point between `a` and `b` where `f`, nonnegative at `a`, becomes negative, by the method of Oliveira and Takahashi (2020),
-/// with hardly more evaluations than bisection at worst and few if `f` is smooth. The remaining width is the tolerance, or one rounding.
+/// Finds the point between `a` and `b` where `f`, nonnegative at `a`, becomes negative, by the method of Oliveira and Takahashi (2020). It
+/// needs hardly more evaluations than bisection in the worst case and few if `f` is smooth. The remaining width is the tolerance, or one
+/// rounding error.
 fn refine<S: Scalar, E>(
     (mut a, mut b): (S, S),
     tolerance: S,
@@ -97,10 +98,10 @@ fn refine<S: Scalar, E>(
 }
 
 impl<'a, S: Scalar> Watcher<'a, S> {
-    /// A watcher of a motion that starts at `(q, v)`; none if the options have no events.
+    /// Returns a watcher for a motion that starts at `(q, v)`; `None` if the options contain no events.
     ///
     /// # Errors
-    /// [`RolloutError::Invalid`] for impacts in a motion that runs backwards.
+    /// [`RolloutError::Invalid`] for impacts in a motion backwards in time.
     pub(super) fn new(
         model: &'a dyn EulerLagrange<S>,
         (q, v): (&[S], &[S]),
@@ -146,14 +147,14 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         if above != self.backwards { falling } else { rising }
     }
 
-    /// The number of an event at a share of a step.
+    /// Returns the value of an event at a fraction of a step.
     fn value(&mut self, event: usize, share: S, time: &dyn Fn(S) -> S, dense: &mut Dense<'_, S>) -> S {
         dense(share, &mut self.state);
         let (q, v) = self.state.split_at(self.normal.len());
         self.events[event].when.value(time(share), q, v)
     }
 
-    /// The first crossing within a step behind a share of it; `dense` refines it.
+    /// Finds the first crossing after a fraction of a step, and refines it with `dense`.
     pub(super) fn first(&mut self, from: S, time: &dyn Fn(S) -> S, dense: &mut Dense<'_, S>) -> Option<Found<S>> {
         let mut first: Option<Found<S>> = None;
         for event in 0..self.events.len() {
@@ -170,14 +171,14 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         first
     }
 
-    /// The first crossing of one event.
+    /// Finds the first crossing of one event.
     fn first_of(&mut self, event: usize, from: S, time: &dyn Fn(S) -> S, dense: &mut Dense<'_, S>) -> Option<Found<S>> {
         let one = <S as Real>::one();
         let place = |k: usize| from + (one - from) * S::of_f64(k as f64 / EVENT_PARTS as f64);
         let mut known = self.sides[event];
         let start = side(self.value(event, from, time, dense));
         if self.fired != Some(event) && start.is_some() && start != known {
-            // Another event happened at the same time, or a little later than this one.
+            // Another event happened at the same time or slightly later.
             if let Some(above) = known.filter(|above| self.catches(event, *above)) {
                 return Some(Found { event, between: (from, from), above });
             }
@@ -207,7 +208,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         None
     }
 
-    /// The number of an event at a share of a step, above zero on the side given.
+    /// Returns the value of an event at a fraction of a step, with the sign that makes the given side positive.
     fn oriented(
         &mut self,
         (event, above): (usize, bool),
@@ -219,7 +220,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         if above { value } else { -value }
     }
 
-    /// A point between two on the same side where the number is on the other side, if its slopes at both suggest one.
+    /// Finds a point on the other side of zero between two points on the same side, if the slopes at both suggest one.
     fn beyond(
         &mut self,
         event: usize,
@@ -247,7 +248,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         None
     }
 
-    /// A crossing refined to the rounding of the time.
+    /// Refines a crossing to the rounding error of the time.
     fn refined(
         &mut self,
         event: usize,
@@ -261,8 +262,8 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         refine(between, tolerance, &mut f).unwrap_or(between)
     }
 
-    /// Refines a crossing with states that the method itself computes, given the share of the step: first near where `dense` has found it.
-    /// None if there is no crossing.
+    /// Refines a crossing with states from the integrator, given the fraction of the step, starting near the result of `dense`. Returns
+    /// `None` if there is no crossing.
     ///
     /// # Errors
     /// Those of `exact`.
@@ -285,7 +286,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         if between.0 == between.1 {
             return Ok(Some(found));
         }
-        // Grow around the place until the crossing is inside.
+        // Enlarge the interval until it contains the crossing.
         let part = S::ratio(1, EVENT_PARTS as i32);
         let mut reach = part.ldexp(-10);
         let (mut a, mut b) = between;
@@ -305,13 +306,13 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         Ok(Some(Found { between, ..found }))
     }
 
-    /// The share of a step at which the motion continues after a crossing: at an impact, it is still on the near side.
+    /// Returns the fraction of a step from which the motion continues after a crossing; for an impact this is still before zero.
     pub(super) fn share(&self, found: &Found<S>) -> S {
         if self.events[found.event].restitution.is_some() { found.between.0 } else { found.between.1 }
     }
 }
 
-/// The rounding of the time as a share of a step.
+/// Returns the rounding error of the time as a fraction of a step.
 fn rounding<S: Scalar>(time: &dyn Fn(S) -> S) -> S {
     let (start, end) = (time(<S as Real>::zero()), time(<S as Real>::one()));
     S::epsilon() * S::max(start.abs(), end.abs()) / (end - start).abs()

@@ -1,4 +1,4 @@
-//! Interpolation inside one accepted step.
+//! Interpolation within an accepted step.
 //!
 //! Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), section
 //! II.6, and their codes DOPRI5 and DOP853. The interpolant is
@@ -7,10 +7,10 @@
 
 use crate::scalar::{Real, Scalar};
 
-/// A right-hand side `dy = f(t, y)`, `t` the elapsed time.
+/// A right-hand side `dy = f(t, y)`, where `t` is the elapsed time.
 pub(super) type Rhs<'a, S, E> = dyn FnMut(S, &[S], &mut [S]) -> Result<(), E> + 'a;
 
-/// Weights of the fifth coefficient of DOPRI5 over its stages (Shampine's, order 4).
+/// Weights of the stages for the fifth coefficient of DOPRI5 (Shampine's, order 4).
 const DOPRI5: Weights = &[
     (1, -12715105075.0 / 11282082432.0),
     (3, 87487479700.0 / 32700410799.0),
@@ -23,10 +23,10 @@ const DOPRI5: Weights = &[
 /// `(index of the stage, weight)`, stages counted from 1.
 type Weights = &'static [(usize, f64)];
 
-/// Nodes of the stages 14 to 16.
+/// Nodes of stages 14 to 16.
 const EXTRA_NODES: [f64; 3] = [0.1, 0.2, 7.0 / 9.0];
 
-/// Stages 14 to 16: `(index of k, weight)`; row sums are the nodes.
+/// Stages 14 to 16: `(index of k, weight)`; the row sums are the nodes.
 const EXTRA: [Weights; 3] = [
     &[
         (1, 0.056167502283047954),
@@ -60,7 +60,7 @@ const EXTRA: [Weights; 3] = [
     ],
 ];
 
-/// Weights of the four highest coefficients over the stages.
+/// Weights of the stages for the four highest coefficients.
 const DENSE: [Weights; 4] = [
     &[
         (1, -8.428938276109013),
@@ -120,7 +120,7 @@ const DENSE: [Weights; 4] = [
     ],
 ];
 
-/// One accepted step of size `h` from `y0` to `y1`; `slopes` holds the stages `k1`, `k2`, ... one after the other.
+/// One accepted step of size `h` from `y0` to `y1`; `slopes` contains the stages `k1`, `k2`, ... in order.
 pub(super) struct Step<'a, S> {
     /// Elapsed time at its start.
     pub t0: S,
@@ -144,13 +144,13 @@ pub(super) struct Interpolant<S> {
 }
 
 impl<S: Scalar> Interpolant<S> {
-    /// Interpolant of order 4 of a DOPRI5 step.
+    /// Computes the interpolant of order 4 of a DOPRI5 step.
     pub fn dopri5(&mut self, step: &Step<'_, S>) {
         self.hermite(step, 7, 5);
         self.weigh(step.h, 4, DOPRI5);
     }
 
-    /// Interpolant of order 7 of a DOP853 step; needs three evaluations of `f(t, y, dy)`.
+    /// Computes the interpolant of order 7 of a DOP853 step, with three evaluations of `f(t, y, dy)`.
     ///
     /// # Errors
     /// The first error of `f`.
@@ -173,7 +173,7 @@ impl<S: Scalar> Interpolant<S> {
         Ok(())
     }
 
-    /// The state at the fraction `s` of the step.
+    /// Writes the state at the fraction `s` of the step.
     pub fn evaluate(&self, s: S, state: &mut [S]) {
         let rest = <S as Real>::one() - s;
         let rows = self.coefficients.len() / self.dim.max(1);
@@ -186,7 +186,7 @@ impl<S: Scalar> Interpolant<S> {
         }
     }
 
-    /// The four coefficients that both methods share, and room for all.
+    /// Computes the four coefficients that both methods share, and allocates the others.
     fn hermite(&mut self, step: &Step<'_, S>, stages: usize, rows: usize) {
         let dim = step.y0.len();
         self.dim = dim;
@@ -211,7 +211,7 @@ impl<S: Scalar> Interpolant<S> {
     }
 }
 
-/// The number at the share `x` of a step of signed length `h`, by Hermite's polynomial of its values and slopes `[q0, v0, q1, v1]` at both
+/// Returns the Hermite interpolation at the fraction `x` of a step of signed length `h`, given values and slopes `[q0, v0, q1, v1]` at both
 /// ends.
 pub(super) fn cubic<S: Scalar>(x: S, h: S, [q0, v0, q1, v1]: [S; 4]) -> S {
     let one = <S as Real>::one();
@@ -219,14 +219,14 @@ pub(super) fn cubic<S: Scalar>(x: S, h: S, [q0, v0, q1, v1]: [S; 4]) -> S {
     q0 * (one - all) + q1 * all + h * x * y * (v0 * y - v1 * x)
 }
 
-/// Its slope.
+/// Returns the slope of the Hermite interpolation.
 pub(super) fn cubic_slope<S: Scalar>(x: S, h: S, [q0, v0, q1, v1]: [S; 4]) -> S {
     let (one, three) = (<S as Real>::one(), S::of_f64(3.0));
     let y = one - x;
     S::of_f64(6.0) * x * y * ((q1 - q0) / h) + v0 * y * (one - three * x) + v1 * x * (one - three * y)
 }
 
-/// `sum weight * k_stage` of component `i`; stages count from 1.
+/// Computes `sum weight * k_stage` of component `i`; stages are counted from 1.
 fn combine<S: Scalar>(slopes: &[S], dim: usize, i: usize, weights: &[(usize, f64)]) -> S {
     let mut sum = <S as Real>::zero();
     for &(stage, weight) in weights {
@@ -245,7 +245,7 @@ mod tests {
         for (weights, node) in EXTRA.iter().zip(EXTRA_NODES) {
             assert!((sum(weights) - node).abs() < 1e-14, "{node}: {}", sum(weights));
         }
-        // A constant derivative is interpolated by the first two coefficients alone.
+        // For a constant derivative only the first two coefficients are nonzero.
         assert!(sum(DOPRI5).abs() < 1e-14);
         for weights in DENSE {
             let scale: f64 = weights.iter().map(|w| w.1.abs()).sum();

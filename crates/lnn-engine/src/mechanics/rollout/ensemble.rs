@@ -1,8 +1,8 @@
-//! Many motions, integrated individually or in groups that are evaluated together.
+//! Integrates many motions, individually or in groups whose states are evaluated together.
 //!
-//! In a group the motions wait for each other, so that all requested states are evaluated as one batch. Every motion keeps its own steps
-//! and error control. Each runs until it needs its model, and waits there for the others; the last to arrive evaluates all states at once,
-//! in the order of the motions. A wide network then reads its weights once per round instead of once per motion.
+//! The motions of a group wait for each other, so that all requested states are evaluated as one batch. Every motion has separate steps and
+//! error control. Each thread runs until it needs the model; the last one to arrive evaluates all states at once, in the order of the
+//! motions. A wide network then reads its weights once per round instead of once per motion.
 
 use super::run::adaptive_or_fixed;
 use super::thresholds::MOTIONS_TOGETHER;
@@ -13,25 +13,25 @@ use crate::storage::{MOST_THREADS, in_order};
 use std::ops::Range;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The start of a motion, and the external force that drives it, if there is one.
+/// The initial state of a motion, and the external force that acts on it, if any.
 #[derive(Clone, Copy)]
 pub struct Start<'a, S: Scalar> {
     /// Coordinates, `(n)`.
     pub q: &'a [S],
     /// Velocities, `(n)`.
     pub v: &'a [S],
-    /// Force from outside.
+    /// External force.
     pub force: Option<&'a dyn Force<S>>,
 }
 
-/// The starts without forces.
+/// Returns initial states without forces.
 fn free<S: Scalar>(starts: &[(Vec<S>, Vec<S>)]) -> Vec<Start<'_, S>> {
     starts.iter().map(|(q, v)| Start { q, v, force: None }).collect()
 }
 
-/// Rolls out every start `(q, v)`; the results keep the order of the starts and do not depend on `threads`.
+/// Integrates a motion from every initial state `(q, v)`. The results have the order of the initial states and do not depend on `threads`.
 ///
-/// Large ensembles of a model that [`EulerLagrange::prefers_batches`] advance as [`rollout_together`] does.
+/// Large ensembles of a model that [`EulerLagrange::prefers_batches`] are integrated as in [`rollout_together`].
 pub fn rollout_many<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[(Vec<S>, Vec<S>)],
@@ -41,7 +41,7 @@ pub fn rollout_many<S: Integrable>(
     rollout_each(model, &free(starts), options, threads)
 }
 
-/// [`rollout_many`] with a force of its own for every start.
+/// Does the same as [`rollout_many`] with a separate force for every motion.
 pub fn rollout_each<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[Start<'_, S>],
@@ -54,11 +54,11 @@ pub fn rollout_each<S: Integrable>(
     in_order(starts, threads, |start| adaptive_or_fixed(model, start.force, start.q, start.v, options))
 }
 
-/// Rolls out every start `(q, v)` like [`rollout_many`](super::rollout_many), groups of motions evaluated as one batch.
+/// Integrates a motion from every initial state `(q, v)` as [`rollout_many`](super::rollout_many) does, but evaluates groups of motions as
+/// one batch.
 ///
-/// The results keep the order of the starts and do not depend on `threads`, the number of groups at work at a time. They agree with single
-/// motions to rounding, not to the bit. It pays for models that are slow for one state and faster per state for several, as
-/// [`EulerLagrange::prefers_batches`] says.
+/// The results have the order of the initial states and do not depend on `threads`, the number of simultaneous groups. They agree with
+/// single motions up to rounding. This is faster for models for which [`EulerLagrange::prefers_batches`] returns `true`.
 pub fn rollout_together<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     starts: &[(Vec<S>, Vec<S>)],
@@ -75,7 +75,7 @@ fn together<S: Integrable>(
     threads: usize,
 ) -> Vec<Rollout<S>> {
     let groups: Vec<_> = starts.chunks(MOTIONS_TOGETHER).collect();
-    // Every motion of a group has a thread.
+    // Every motion of a group has its own thread.
     let abreast = threads.min(MOST_THREADS / MOTIONS_TOGETHER);
     in_order(&groups, abreast, |group| roll_group(model, group, options)).into_iter().flatten().collect()
 }
@@ -86,14 +86,14 @@ fn roll_group<S: Integrable>(
     options: &RolloutOptions<S>,
 ) -> Vec<Rollout<S>> {
     let group = Group::new(model, starts.len());
-    // Every member must exist before the first one could conclude that it is alone.
+    // All members must exist before the first one starts; otherwise it would assume that it is alone.
     let members: Vec<_> = (0..starts.len()).map(|index| group.member(index)).collect();
     std::thread::scope(|scope| {
         let running: Vec<_> = members
             .into_iter()
             .zip(starts)
             .map(|(member, start)| {
-                // Without a thread the member is gone with the closure, and the others do not wait for it.
+                // If no thread can be started, the closure is dropped with its member, and the others do not wait for it.
                 let work = move || adaptive_or_fixed(&member, start.force, start.q, start.v, options);
                 std::thread::Builder::new().spawn_scoped(scope, work)
             })
@@ -113,19 +113,19 @@ pub(super) struct Group<'a, S> {
     evaluated: Condvar,
 }
 
-/// Requests of the members, until the last one has arrived, and the answer.
+/// The requests of the members until the last one has arrived, and the result.
 struct Round<S> {
-    /// Rounds evaluated so far.
+    /// Number of evaluated rounds.
     number: u64,
     active: usize,
-    /// State that each member waits for; no member waits once it is evaluated.
+    /// The state for which each member waits; `None` once it is evaluated.
     asked: Vec<Option<Asked<S>>>,
     /// Rows of each member in the last batch.
     rows: Vec<Range<usize>>,
     q: Vec<S>,
     v: Vec<S>,
     terms: Terms<S>,
-    /// Union of all requests.
+    /// The union of all requests.
     request: Request,
     /// `true` unless the round failed for a reason that does not concern single states.
     has_row_failures: bool,
@@ -153,7 +153,7 @@ impl<'a, S: Scalar> Group<'a, S> {
         Self { model, round: Mutex::new(round), evaluated: Condvar::new() }
     }
 
-    /// Member `index`, who belongs to the group until dropped.
+    /// Returns member `index`, which belongs to the group until it is dropped.
     fn member(&self, index: usize) -> Member<'_, 'a, S> {
         Member { group: self, index }
     }
@@ -184,14 +184,14 @@ impl<'a, S: Scalar> Group<'a, S> {
     }
 }
 
-/// One motion's view of the model: it makes requests, waits for the others, and takes its rows.
+/// A motion's view of the model: it submits requests, waits for the others, and takes its rows of the result.
 struct Member<'g, 'a, S: Scalar> {
     group: &'g Group<'a, S>,
     index: usize,
 }
 
 impl<S: Scalar> Drop for Member<'_, '_, S> {
-    /// The others no longer wait for this motion.
+    /// Removes this motion, so that the others no longer wait for it.
     fn drop(&mut self) {
         let mut round = self.group.lock();
         round.active -= 1;
@@ -228,7 +228,7 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
             }
         }
         drop(round);
-        // A failure may concern only what the others requested.
+        // A failure may concern only terms that the others requested.
         self.group.model.terms(q, v, request, terms)
     }
 }
@@ -244,7 +244,8 @@ mod tests {
         (0..count).map(|k| (vec![0.3 * k as f64, 0.2], vec![0.1, -0.1 * k as f64])).collect()
     }
 
-    /// The motions agree for every kind of method, up to the growth of rounding, and to the bit on any number of threads.
+    /// Motions in a group agree with single motions for every kind of method up to the growth of rounding errors, and are bitwise equal for
+    /// any number of threads.
     #[test]
     fn motions_together_are_the_motions_alone() {
         let system = configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
@@ -265,12 +266,12 @@ mod tests {
         assert!(rollout_together(&*system, &[], &RolloutOptions::new(1.0, 0.1), 2).is_empty());
     }
 
-    /// A motion that fails or ends early neither stops the others nor lends them its error.
+    /// A motion that fails or ends early neither stops the others nor passes its error to them.
     #[test]
     fn one_that_fails_leaves_the_others_alone() {
         let system = configure::<f64>("spring-pendulum", &[]).unwrap().build().unwrap();
         let mut starts = vec![(vec![1.0, 0.3], vec![0.1, 0.2]); 3];
-        // r = 0 is singular; the last start is refused before it begins.
+        // r = 0 is singular; the last initial state is rejected before the integration.
         starts[1].0[0] = 0.0;
         starts.push((vec![f64::NAN, 0.0], vec![0.0, 0.0]));
         let options = RolloutOptions::new(3.0, 0.1);
@@ -300,7 +301,7 @@ mod tests {
         }
     }
 
-    /// Outcomes of two members with simultaneous requests, and the evaluations that took.
+    /// Returns the outcomes of two members with simultaneous requests, and the number of evaluations.
     fn ask(requests: [Request; 2]) -> ([Result<(), MechanicsError>; 2], usize) {
         let model = configure::<f64>("spring-pendulum", &[]).unwrap().build().unwrap();
         let model = Counted { model, calls: AtomicUsize::new(0) };
@@ -327,7 +328,7 @@ mod tests {
         let (outcomes, calls) = ask([Request::ACCELERATION; 2]);
         assert!(matches!(outcomes, [Ok(()), Err(MechanicsError::Singular { row: 0, .. })]), "{outcomes:?}");
         assert_eq!(calls, 1);
-        // A term that only the other member requested does not fail a member.
+        // A term that only the other member requested does not cause a failure.
         let (outcomes, calls) = ask([Request::ACCELERATION, Request::ENERGY]);
         assert_eq!((outcomes, calls), ([Ok(()), Ok(())], 2));
     }

@@ -1,17 +1,17 @@
-//! Events: zeros along a motion, and their effects.
+//! Events: zeros of a function along a motion, and their effects.
 
 use crate::lagrangian::GivenEvent;
 use crate::scalar::{Real, Scalar};
 use std::fmt;
 use std::sync::Arc;
 
-/// A number along a motion whose zeros are events.
+/// A function along a motion whose zeros are events.
 pub(super) trait When<S: Scalar>: Send + Sync {
-    /// Its value.
+    /// Returns its value.
     fn value(&self, t: S, q: &[S], v: &[S]) -> S;
 
-    /// Writes its derivatives by the coordinates, `(n)`, and returns the one by the time; by default by sixth-order differences, whose
-    /// error is of the size of `epsilon^(6/7)`.
+    /// Writes its derivatives by the coordinates, `(n)`, and returns its derivative by the time. By default it uses sixth-order differences
+    /// with an error of about `epsilon^(6/7)`.
     fn slopes(&self, t: S, q: &[S], v: &[S], normal: &mut [S]) -> S {
         let mut q = q.to_vec();
         for (i, normal) in normal.iter_mut().enumerate() {
@@ -26,13 +26,13 @@ pub(super) trait When<S: Scalar>: Send + Sync {
     }
 }
 
-/// Weights of `f(x + k h) - f(x - k h)`, `k = 1, 2, 3`, times 60.
+/// Weights of `f(x + k h) - f(x - k h)` for `k = 1, 2, 3`, times 60.
 const WEIGHTS: [i32; 3] = [45, -9, 1];
 
-/// The slope of a function at `x`.
+/// Returns the derivative of a function at `x`.
 fn difference<S: Scalar>(x: S, mut f: impl FnMut(S) -> S) -> S {
     let (one, zero) = (<S as Real>::one(), <S as Real>::zero());
-    // Above epsilon^(1/7), a power of 2, so that nothing is lost in the shifts.
+    // A power of 2 above epsilon^(1/7), so that the displacements are exact.
     let exponent = (S::epsilon().to_f64().log2() / 7.0).ceil() as i32;
     let h = S::max(x.abs(), one).ldexp(exponent);
     let pairs = WEIGHTS.iter().zip(1..).map(|(&weight, k)| {
@@ -59,11 +59,12 @@ impl<S: Scalar> When<S> for GivenEvent<S> {
     }
 }
 
-/// An event to watch for in a motion: the zeros of a number `when(t, q, v)`. Each zero is recorded, and may end the motion or be an impact.
+/// An event along a motion: a zero of a function `when(t, q, v)`. Each zero is recorded, and may end the motion or cause an impact.
 ///
-/// Belongs to [`RolloutOptions::events`](super::RolloutOptions::events); the zeros found are in [`Rollout::events`](super::Rollout::events). They are
-/// sought within every step, through the integrator's interpolation, and determined to rounding. The value at the start is not an event.
-/// Two zeros so close that the number does not change its sign between eight equidistant points of a step are found if its slope does.
+/// Pass events to [`RolloutOptions::events`](super::RolloutOptions::events); the zeros found are in
+/// [`Rollout::events`](super::Rollout::events). They are located within every step with the integrator's interpolation, up to rounding. A
+/// zero at the start is not an event. If two zeros are so close that the function does not change sign between eight equidistant points of
+/// a step, they are found if its slope does.
 ///
 /// ```
 /// use lnn::lagrangian::{ExpressionLagrangian, Mechanics};
@@ -89,51 +90,52 @@ pub struct Event<S> {
 }
 
 impl<S: Scalar> Event<S> {
-    /// Zeros of `when(t, q, v)`, `q` and `v` of `n` numbers, in either direction; each is recorded under the name.
+    /// Defines an event at the zeros of `when(t, q, v)`, where `q` and `v` have `n` numbers, in either direction; each is recorded under
+    /// the name.
     pub fn new(name: impl Into<String>, when: impl Fn(S, &[S], &[S]) -> S + Send + Sync + 'static) -> Self {
         Self { name: name.into(), when: Arc::new(when), falling: true, rising: true, last: None, restitution: None }
     }
 
-    /// Only zeros at which the number falls in time.
+    /// Counts only zeros at which the function decreases with time.
     #[must_use]
     pub fn falling(self) -> Self {
         Self { falling: true, rising: false, ..self }
     }
 
-    /// Only zeros at which the number rises in time.
+    /// Counts only zeros at which the function increases with time.
     #[must_use]
     pub fn rising(self) -> Self {
         Self { falling: false, rising: true, ..self }
     }
 
-    /// The motion ends at the first zero; its last sample is there.
+    /// Ends the motion at the first zero, where it adds a last sample.
     #[must_use]
     pub fn stop(self) -> Self {
         self.stop_after(1)
     }
 
-    /// The motion ends when the event has happened `times` times.
+    /// Ends the motion when the event has happened `times` times.
     #[must_use]
     pub fn stop_after(self, times: usize) -> Self {
         Self { last: Some(times.max(1)), ..self }
     }
 
-    /// `true` for an impact.
+    /// Returns `true` for an impact.
     pub fn is_impact(&self) -> bool {
         self.restitution.is_some()
     }
 
-    /// An impact on the surface `when(t, q) = 0`, which must not depend on velocities. With its normal `n = d when/dq` and the velocity `u
-    /// = n.v + d when/dt` across it, `v` becomes `v - (1 + e) u M^-1 n / (n.M^-1 n)` for the coefficient of restitution `e`, from 0 to 1;
-    /// at a surface at rest the motion loses the energy `(1 - e^2) u^2 / (2 n.M^-1 n)`. Under constraints, `M^-1` is the inverse along
-    /// them.
+    /// Makes the event an impact on the surface `when(t, q) = 0`, which must not depend on velocities. With its normal `n = d when/dq` and
+    /// the velocity `u = n.v + d when/dt` across it, `v` becomes `v - (1 + e) u M^-1 n / (n.M^-1 n)`, where the coefficient of restitution
+    /// `e` is from 0 to 1. On a surface at rest the motion loses the energy `(1 - e^2) u^2 / (2 n.M^-1 n)`. With constraints, `M^-1` is the
+    /// inverse within them.
     #[must_use]
     pub fn restitution(self, e: S) -> Self {
         Self { restitution: Some(Arc::new(move |_: S, _: &[S], _: &[S]| e)), ..self }
     }
 }
 
-/// The event of a system file.
+/// Converts an event of a system file.
 impl<S: Scalar> From<GivenEvent<S>> for Event<S> {
     fn from(given: GivenEvent<S>) -> Self {
         let event = given.event.clone();
@@ -161,7 +163,7 @@ impl<S> fmt::Debug for Event<S> {
     }
 }
 
-/// Events are equal if they share their functions.
+/// Events are equal if they share the same functions.
 impl<S> PartialEq for Event<S> {
     fn eq(&self, other: &Self) -> bool {
         let same = |a: &Arc<dyn When<S>>, b: &Arc<dyn When<S>>| Arc::ptr_eq(a, b);
@@ -174,40 +176,40 @@ impl<S> PartialEq for Event<S> {
     }
 }
 
-/// An event that happened.
+/// An occurrence of an event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Occurrence<S> {
     /// Name of the event.
     pub name: String,
-    /// Its time.
+    /// Time of the event.
     pub t: S,
-    /// Coordinates there, `(n)`.
+    /// Coordinates at the event, `(n)`.
     pub q: Vec<S>,
-    /// Velocities, after an impact, `(n)`.
+    /// Velocities at the event, or after an impact, `(n)`.
     pub v: Vec<S>,
-    /// The changes by an impact.
+    /// The effect of an impact.
     pub impact: Option<Impact<S>>,
 }
 
-/// Velocities and energies at an impact.
+/// Velocities and energies of an impact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Impact<S> {
-    /// Velocities before it, `(n)`.
+    /// Velocities before the impact, `(n)`.
     pub v_before: Vec<S>,
-    /// Energy `p.v - L` before it, in the unit of `L`.
+    /// Energy `p.v - L` before the impact, in the unit of `L`.
     pub energy_before: S,
-    /// The energy after the impact.
+    /// Energy after the impact.
     pub energy_after: S,
 }
 
 impl<S: Scalar> Impact<S> {
-    /// Energy that the impact took.
+    /// Returns the energy lost in the impact.
     pub fn lost(&self) -> S {
         self.energy_before - self.energy_after
     }
 }
 
-/// Energy that all impacts took.
+/// Returns the energy lost in all impacts.
 pub(super) fn lost<S: Scalar>(events: &[Occurrence<S>]) -> S {
     let impacts = events.iter().filter_map(|event| event.impact.as_ref());
     impacts.fold(<S as Real>::zero(), |sum, impact| sum + impact.lost())

@@ -1,4 +1,4 @@
-//! Fixed steps from sample to sample in phase space.
+//! Fixed-step integration from sample to sample in phase space.
 
 use super::crossing::{Found, Watcher};
 use super::dense::{cubic, cubic_slope};
@@ -14,7 +14,7 @@ use super::{Force, Integrator, RolloutError, RolloutOptions, StepCounts, StepFai
 use crate::lagrangian::EulerLagrange;
 use crate::scalar::{Real, Scalar};
 
-/// A structure-preserving method with its memory.
+/// A structure-preserving method with its stored data.
 pub(super) enum Stepper<S> {
     Gauss(Gauss<S>),
     Variational(Variational<S>),
@@ -22,7 +22,7 @@ pub(super) enum Stepper<S> {
 }
 
 impl<S: Scalar> Stepper<S> {
-    /// The stepper of a method for the coordinates of a model, if it has a fixed step.
+    /// Returns the stepper of a method for a model; `None` for an adaptive method.
     pub(super) fn new(method: Integrator, model: &dyn EulerLagrange<S>) -> Option<Self> {
         let n = model.coordinates();
         if let Some(manifold) = model.manifold() {
@@ -60,7 +60,7 @@ impl<S: Scalar> Stepper<S> {
         }
     }
 
-    /// Coordinates and velocities at the stages of the last step.
+    /// Returns coordinates and velocities at the stages of the last step.
     fn stages(&self) -> (&[S], &[S]) {
         match self {
             Self::Gauss(gauss) => gauss.stages(),
@@ -70,20 +70,20 @@ impl<S: Scalar> Stepper<S> {
     }
 }
 
-/// Progress of a roll-out.
+/// The current position of a roll-out.
 struct Position<'a, S> {
     state: PhasePoint<S>,
-    /// A velocity close to that of the state.
+    /// A velocity close to the current one.
     near: Vec<S>,
-    /// Elapsed time of the sample or break before, and steps of size `h` since.
+    /// Elapsed time at the last sample or break, and the number of steps of size `h` since then.
     since: S,
     steps: usize,
     h: S,
-    /// Knowledge about the rows of constraints.
+    /// Checks that the constraint rows stay regular.
     regular: Option<Regularity<'a, S>>,
 }
 
-/// Integrates from `(q, v)` to the end of the options, or as far as possible; arguments have been checked.
+/// Integrates from `(q, v)` to the end of the options, or as far as possible. The arguments must be checked before.
 pub(super) fn run<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -138,7 +138,7 @@ fn advance<'a, S: Scalar>(
 ) -> Option<RolloutError> {
     let samples = Samples::new(options);
     let domain = options.domain.as_ref();
-    // All distances but the last are dt, whatever the rounding of their difference.
+    // All intervals except the last are dt, whatever the rounding of their difference.
     let regular = options.dt.abs();
     let last = samples.len() - 1;
     let mut piece = 0;
@@ -147,7 +147,7 @@ fn advance<'a, S: Scalar>(
         let difference = elapsed - start;
         let blur = S::epsilon().ldexp(3) * elapsed;
         let whole = if k < last || (difference - regular).abs() <= blur { regular } else { difference };
-        // To every break on the way, then to the sample.
+        // Integrate to every break on the way, then to the sample.
         let mut legs = vec![(start, whole, cuts[piece])];
         while piece + 1 < cuts.len() && cuts[piece].end <= elapsed + blur {
             let from = cuts[piece].end;
@@ -188,10 +188,11 @@ fn advance<'a, S: Scalar>(
     None
 }
 
-/// Receivers of counts, nodes and events of steps.
+/// Receivers of counts, nodes and events.
 type Counted<'r, 'n, 'w, S> = (&'r mut StepCounts, Option<&'r mut Nodes<'n, S>>, Option<&'r mut Watcher<'w, S>>);
 
-/// Steps over a distance in elapsed time within one piece, on from events; times closer than `blur` are one.
+/// Integrates over an interval of elapsed time within one piece, and continues after events; times that differ by less than `blur` are
+/// equal.
 fn leg<'a, S: Scalar>(
     phase: &mut PhaseSpace<'a, S>,
     stepper: &mut Stepper<S>,
@@ -211,19 +212,19 @@ fn leg<'a, S: Scalar>(
     }
 }
 
-/// How far steps have come.
+/// The result of integrating over an interval.
 enum Stretch<S> {
-    /// Over the whole distance.
+    /// The end of the interval was reached.
     Whole,
-    /// Until an event at an elapsed time, from which the motion continues.
+    /// An event interrupts the motion at this elapsed time, from which it continues.
     Until(S),
-    /// Until an event at a time and state that ends the motion.
+    /// An event ends the motion at this time and state.
     Ended(S, Vec<S>),
-    /// Not over the whole distance.
+    /// The integration failed.
     Failed(RolloutError),
 }
 
-/// Steps over a distance in elapsed time within one piece.
+/// Integrates over an interval of elapsed time within one piece, up to the first event.
 fn stretch<'a, S: Scalar>(
     phase: &mut PhaseSpace<'a, S>,
     stepper: &mut Stepper<S>,
@@ -235,12 +236,12 @@ fn stretch<'a, S: Scalar>(
 ) -> Stretch<S> {
     let backwards = options.t_end < options.t0;
     let longest = options.step.unwrap_or(distance);
-    // A longest step beyond the distance is cut to it.
+    // The step is at most the whole interval.
     let count = ((distance / longest - S::epsilon().ldexp(4)).floor().to_f64() + 1.0).max(1.0);
     let h = distance / S::of_f64(count);
     (position.since, position.steps, position.h) = (from, 0, h);
     let signed = if backwards { -h } else { h };
-    // A count beyond all numbers of steps ends by `max_steps`.
+    // `max_steps` ends the loop if the count exceeds any integer.
     while (position.steps as f64) < count {
         if statistics.accepted == options.max_steps {
             let t = position.time(options, backwards).to_f64();
@@ -283,11 +284,11 @@ fn stretch<'a, S: Scalar>(
     Stretch::Whole
 }
 
-/// An event, its share of the step and the state there.
+/// An event, its fraction of the step, and the state there.
 type Interruption<S> = (Found<S>, S, Vec<S>);
 
-/// The first event that interrupts the last step, which began at `before`, with its share of the step and the state there, to which the
-/// motion is reset. Earlier events that do not interrupt it are marked.
+/// Returns the first event that interrupts the last step, which began at `before`, with its fraction of the step and the state there, to
+/// which the motion is reset. Earlier events that do not interrupt it are recorded.
 fn interruption<S: Scalar>(
     phase: &mut PhaseSpace<'_, S>,
     stepper: &mut Stepper<S>,
@@ -317,7 +318,7 @@ fn interruption<S: Scalar>(
     let time = |share: S| t + share * signed;
     let (mut from, one) = (zero, <S as Real>::one());
     while from < one {
-        // From the last known state.
+        // Start from the last known state.
         let rest = one - from;
         let mut dense = |share: S, state: &mut [S]| {
             for i in 0..n {
@@ -340,14 +341,14 @@ fn interruption<S: Scalar>(
         (from, start) = (share, state);
     }
     if from > zero {
-        // The stages of the whole step again.
+        // Compute the stages of the whole step again.
         exact(one, &mut start)?;
     }
     (position.state, position.near) = after;
     Ok(None)
 }
 
-/// Hands over the stages of the last step, of length `h` from `t`, as the nodes of a quadrature.
+/// Passes the stages of the last step, of length `h` from `t`, to the receiver as quadrature nodes.
 fn visit_stages<S: Scalar>(stepper: &Stepper<S>, n: usize, (t, h): (S, S), nodes: &mut Nodes<'_, S>) {
     let (q, v) = stepper.stages();
     let Tableau { nodes: places, weights, .. } = Tableau::<S>::new(q.len() / n);
@@ -357,7 +358,7 @@ fn visit_stages<S: Scalar>(stepper: &Stepper<S>, n: usize, (t, h): (S, S), nodes
     }
 }
 
-/// Checks the stages of the last step.
+/// Checks that the stages of the last step are finite and inside the domain.
 fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &RolloutOptions<S>) -> Result<(), StepFailure> {
     let Some(domain) = options.domain.as_ref() else { return Ok(()) };
     let (q, v) = stepper.stages();
@@ -371,7 +372,7 @@ fn inside<S: Scalar>(stepper: &Stepper<S>, n: usize, options: &RolloutOptions<S>
 }
 
 impl<'a, S: Scalar> Position<'a, S> {
-    /// Applies an event at a time, an elapsed time and a state, and continues from there.
+    /// Applies an event at a time, an elapsed time and a state, and restarts the motion from there.
     fn strike(
         &mut self,
         phase: &mut PhaseSpace<'a, S>,
@@ -396,7 +397,7 @@ impl<'a, S: Scalar> Position<'a, S> {
                 return Stretch::Failed(into_error(failure, t.to_f64(), state, self.h.to_f64()));
             }
         }
-        // Impacts are of motions that run forwards.
+        // Impacts only occur in motions forward in time.
         self.regular = phase.manifold().map(|manifold| Regularity::new(manifold, (q, v), false));
         Stretch::Until(elapsed)
     }
@@ -415,7 +416,7 @@ impl<'a, S: Scalar> Position<'a, S> {
         if backwards { options.t0 - elapsed } else { options.t0 + elapsed }
     }
 
-    /// The error of a failure just ahead; if the velocity of the state cannot be computed, the nearest known one is used.
+    /// Returns the error for a failure beyond the current position; if the velocity cannot be computed, the nearest known one is used.
     fn failed(
         &self,
         phase: &mut PhaseSpace<'_, S>,

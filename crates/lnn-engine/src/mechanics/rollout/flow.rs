@@ -1,10 +1,10 @@
-//! The state at the end of a motion as a function of its start, of a force, and of parameters.
+//! The final state of a motion as a function of its initial state, of a force, and of parameters.
 
 use crate::lagrangian::{Accelerations, EulerLagrange, Linearizer, MechanicsError, Request, Terms};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar, update};
 
-/// Coefficients of Dormand and Prince's method of order 5 (1980), by numerators and denominators, and its weights.
+/// Coefficients of the method of Dormand and Prince of order 5 (1980), as numerators and denominators, and its weights.
 const STAGES: [&[(f64, f64)]; 6] = [
     &[],
     &[(1.0, 5.0)],
@@ -16,7 +16,7 @@ const STAGES: [&[(f64, f64)]; 6] = [
 const WEIGHTS: [(f64, f64); 6] =
     [(35.0, 384.0), (0.0, 1.0), (500.0, 1113.0), (125.0, 192.0), (-2187.0, 6784.0), (11.0, 84.0)];
 
-/// The end `y(T) = (q, v)` of a motion and its derivatives.
+/// The final state `y(T) = (q, v)` of a motion and its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlowJacobian<S> {
     /// `y(T)`, `2 n` numbers.
@@ -32,14 +32,14 @@ pub struct FlowJacobian<S> {
 pub struct FlowGradient<S> {
     /// `y(T)`, `2 n` numbers.
     pub end: Vec<S>,
-    /// Derivatives by the start, `2 n` numbers.
+    /// Derivatives by the initial state, `2 n` numbers.
     pub by_start: Vec<S>,
     /// Derivatives by the parameters, as in [`Gradient::by_parameters`](crate::lagrangian::Gradient::by_parameters).
     pub by_parameters: Vec<S>,
 }
 
-/// The map from the start of a motion to its end, by a fixed number of Dormand-Prince steps of order 5, with the exact derivatives of these
-/// steps, for a fit, a filter, or a controller.
+/// Maps the initial state of a motion to its final state, with a fixed number of Dormand-Prince steps of order 5, and provides the exact
+/// derivatives of these steps, for a fit, a filter, or a controller.
 ///
 /// ```
 /// use lnn::lagrangian::build;
@@ -60,16 +60,16 @@ pub struct Flow<'a, S: Scalar> {
 }
 
 impl<'a, S: Scalar> Flow<'a, S> {
-    /// Over a time `duration`, which may be negative, in that many steps.
+    /// Defines the flow over a time `duration`, which may be negative, with this number of steps.
     pub fn new(model: &'a dyn EulerLagrange<S>, duration: S, steps: usize) -> Self {
         let steps = steps.max(1);
         Self { model, step: duration / S::of_f64(steps as f64), steps }
     }
 
-    /// The end of the motion from `(q, v)`, under a generalized force that is constant in time if one is given.
+    /// Computes the final state of the motion from `(q, v)`, with an optional generalized force that is constant in time.
     ///
     /// # Errors
-    /// A state that cannot be evaluated; a wrong length of `q`, `v` or the force.
+    /// A state cannot be evaluated, or `q`, `v` or the force has the wrong length.
     pub fn end(&self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<Vec<S>, MechanicsError> {
         let mut y = self.start(q, v)?;
         let Some(force) = force else {
@@ -88,7 +88,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
         Ok(y)
     }
 
-    /// The end and all its derivatives by the start and by a force, which is 0 if not given.
+    /// Computes the final state and all its derivatives by the initial state and by a constant force, by default 0.
     ///
     /// # Errors
     /// Those of [`Flow::end`].
@@ -96,7 +96,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
         let (n, zero, one) = (self.model.coordinates(), <S as Real>::zero(), <S as Real>::one());
         let mut y = self.start(q, v)?;
         let mut linearizer = Linearizer::new(self.model);
-        // Rows of the state, columns of the start and of the force.
+        // Rows are components of the state; columns are the initial state and the force.
         let width = 3 * n;
         let mut tangents = vec![zero; 2 * n * width];
         (0..2 * n).for_each(|i| tangents[i * width + i] = one);
@@ -129,11 +129,11 @@ impl<'a, S: Scalar> Flow<'a, S> {
         Ok(FlowJacobian { end: y, by_start: part(0..2 * n), by_force: part(2 * n..width) })
     }
 
-    /// The end and the derivatives of `w.y(T)`, with `w` of `2 n` numbers, by the start and by all parameters: one backward sweep over the
-    /// stored states of the steps.
+    /// Computes the final state and the derivatives of `w.y(T)`, with `w` of `2 n` numbers, by the initial state and by all parameters, in
+    /// one backward sweep over the stored states of the steps.
     ///
     /// # Errors
-    /// Those of [`Flow::end`]; a wrong length of `w`.
+    /// Those of [`Flow::end`]; also if `w` has the wrong length.
     pub fn gradient(&self, q: &[S], v: &[S], w: &[S]) -> Result<FlowGradient<S>, MechanicsError> {
         let (n, zero) = (self.model.coordinates(), <S as Real>::zero());
         if w.len() != 2 * n {
@@ -146,7 +146,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
         let (mut weights, mut by_parameters) = (w.to_vec(), Vec::new());
         for state in before.iter().rev() {
             let (stages, _) = self.stages(state, &mut |q, v, a| accelerations.at(q, v, a))?;
-            // Adjoints of the stages' states, from the last.
+            // Adjoints of the stage states, starting with the last stage.
             let mut adjoints: Vec<Vec<S>> = vec![vec![zero; 2 * n]; 6];
             for stage in (0..6).rev() {
                 let mut slope = vec![zero; 2 * n];
@@ -169,7 +169,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
         Ok(FlowGradient { end: y, by_start: weights, by_parameters })
     }
 
-    /// The state at the start.
+    /// Assembles the initial state.
     fn start(&self, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
         let expected = self.model.coordinates();
         for (what, found) in [("coordinates", q.len()), ("velocities", v.len())] {
@@ -180,7 +180,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
         Ok([q, v].concat())
     }
 
-    /// Moves a state to the end; shows it before every step.
+    /// Integrates a state to the end, and passes it to a function before every step.
     fn visit(
         &self,
         y: &mut Vec<S>,
@@ -195,7 +195,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
         Ok(())
     }
 
-    /// The states of the stages of a step, and their slopes.
+    /// Computes the stage states of a step and their slopes.
     fn stages(&self, y: &[S], accelerate: &mut Accelerate<'_, S>) -> Result<Stages<S>, MechanicsError> {
         let n = self.model.coordinates();
         let mut slopes: Vec<Vec<S>> = Vec::with_capacity(6);
@@ -211,7 +211,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
         Ok((states, slopes))
     }
 
-    /// `y` and the step times a combination of slopes.
+    /// Returns `y` plus the step size times a combination of slopes.
     fn combined(&self, y: &[S], factors: &[(f64, f64)], slopes: &[Vec<S>]) -> Vec<S> {
         let mut sum = y.to_vec();
         for (&factor, slope) in factors.iter().zip(slopes) {
@@ -222,7 +222,7 @@ impl<'a, S: Scalar> Flow<'a, S> {
     }
 }
 
-/// Writes the accelerations of a state.
+/// Computes the accelerations of a state.
 type Accelerate<'a, S> = dyn FnMut(&[S], &[S], &mut [S]) -> Result<(), MechanicsError> + 'a;
 type Stages<S> = (Vec<Vec<S>>, Vec<Vec<S>>);
 
@@ -245,7 +245,7 @@ mod tests {
         configured.build().unwrap()
     }
 
-    /// Compares derivatives of the steps with differences of the same steps in double-double.
+    /// Compares derivatives of the steps with differences of the same steps in double-double precision.
     #[test]
     fn derivatives_are_those_of_the_steps() {
         let (q, v, w) = ([1.1, -0.4], [0.3, 0.8], [0.4, -1.0, 0.7, 0.2]);

@@ -1,4 +1,4 @@
-//! External forces, which drive a motion in addition to its own Lagrangian and friction.
+//! External forces, which act in addition to the Lagrangian and the friction.
 
 use super::pieces::{Ending, hand_over};
 use super::run::{adaptive_or_fixed, fixed};
@@ -9,16 +9,16 @@ use crate::scalar::{Real, Scalar};
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
 
-/// External generalized force `Q(t, q, v)`, added to the right-hand side of `M a = g - c + Q`.
+/// An external generalized force `Q(t, q, v)`, added to the right side of `M a = g - c + Q`.
 ///
-/// Closures `Fn(t, q, v, &mut force)` are forces; [`SampledForce`] is a recorded one.
+/// Implemented for closures `Fn(t, q, v, &mut force)`, and for recorded forces: [`SampledForce`].
 pub trait Force<S: Scalar>: Send + Sync {
-    /// Writes `Q` at time `t` and state `(q, v)` into `force`; all three have `n` numbers. `Q_i` is conjugate to `q_i`: N
-    /// for a length in m, N m for an angle in rad, in the unit of `L` per unit of the coordinate.
+    /// Writes `Q` at time `t` and state `(q, v)` to `force`; all three slices have `n` numbers. `Q_i` is conjugate to `q_i`: N for a length
+    /// in m, N m for an angle in rad, in general the unit of `L` per unit of the coordinate.
     fn force(&self, t: S, q: &[S], v: &[S], force: &mut [S]);
 
-    /// Times, ascending, at which the force is not smooth. Integrators end a step at each of them, so that their order holds. The force may
-    /// jump there: the step that ends evaluates it just before such a time, the next step at it.
+    /// Returns ascending times at which the force is not smooth. Integrators end a step at each of them to keep their order. The force may
+    /// jump there: the step before evaluates it just before such a time, and the next step at it.
     fn breaks(&self) -> &[S] {
         &[]
     }
@@ -30,8 +30,8 @@ impl<S: Scalar, F: Fn(S, &[S], &[S], &mut [S]) + Send + Sync> Force<S> for F {
     }
 }
 
-/// A force known at some times: between them linear, unless [`SampledForce::between`] says otherwise, constant before the first and
-/// after the last.
+/// A force that is known at some times: interpolated linearly, unless [`SampledForce::between`] chooses another interpolation, and constant
+/// before the first and after the last time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SampledForce<S> {
     n: usize,
@@ -41,11 +41,10 @@ pub struct SampledForce<S> {
 }
 
 impl<S: Scalar> SampledForce<S> {
-    /// Values `(times, n)` row-major at ascending times, one at least.
+    /// Creates a force from values `(times, n)`, row-major, at one or more ascending times.
     ///
     /// # Errors
-    /// [`RolloutError::Invalid`] for no time, another number of values, times that do not ascend, numbers that are not
-    /// finite.
+    /// [`RolloutError::Invalid`] if there is no time, the number of values is wrong, times do not ascend, or numbers are not finite.
     pub fn new(n: usize, times: Vec<S>, values: Vec<S>) -> Result<Self, RolloutError> {
         let invalid = |problem: String| Err(RolloutError::Invalid { what: "force", problem });
         if n == 0 || times.is_empty() {
@@ -63,37 +62,37 @@ impl<S: Scalar> SampledForce<S> {
         Ok(Self { n, times, values, between: Between::default() })
     }
 
-    /// The same values with another interpolation.
+    /// Returns the same values with another interpolation.
     #[must_use]
     pub fn between(self, between: Between) -> Self {
         Self { between, ..self }
     }
 
-    /// A constant force.
+    /// Returns a constant force.
     ///
     /// # Errors
-    /// [`RolloutError::Invalid`] for no numbers or numbers that are not finite.
+    /// [`RolloutError::Invalid`] if there are no numbers, or numbers are not finite.
     pub fn constant(values: Vec<S>) -> Result<Self, RolloutError> {
         Self::new(values.len(), vec![<S as Real>::zero()], values)
     }
 
-    /// Some of the components, in order.
+    /// Returns some of the components, in order.
     pub fn components(&self, of: core::ops::Range<usize>) -> Self {
         let values = self.values.chunks_exact(self.n).flat_map(|row| &row[of.clone()]).copied().collect();
         Self { n: of.len(), values, ..self.clone() }
     }
 
-    /// `true` if it is 0 at all times.
+    /// Returns `true` if the force is 0 at all times.
     pub fn is_zero(&self) -> bool {
         self.values.iter().all(|value| *value == <S as Real>::zero())
     }
 
-    /// First and last time.
+    /// Returns the first and the last time.
     pub fn span(&self) -> (S, S) {
         (self.times[0], self.times[self.times.len() - 1])
     }
 
-    /// `Q` at a time into `force`, `(n)`.
+    /// Writes `Q` at a time to `force`, `(n)`.
     pub fn at(&self, t: S, force: &mut [S]) {
         let (n, last) = (self.n, self.times.len() - 1);
         if t >= self.times[last] || last == 0 {
@@ -120,27 +119,27 @@ impl<S: Scalar> Force<S> for SampledForce<S> {
     }
 }
 
-/// Part of a motion during which the force is smooth.
+/// An interval of a motion in which the force is smooth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Piece<S> {
     /// Elapsed time `|t - t0|` at its end.
     pub(super) end: S,
-    /// Times at which the force is evaluated; the latter lies just before a break.
+    /// First and last times at which the force is evaluated; the last one is just before a break.
     lower: S,
     upper: S,
 }
 
 impl<S: Scalar> Piece<S> {
-    /// The time nearest to `t` that belongs to the piece.
+    /// Returns the time nearest to `t` within the piece.
     pub(super) fn time(&self, t: S) -> S {
         S::max(S::min(t, self.upper), self.lower)
     }
 }
 
-/// Cuts the time from `t0` to `t_end` at the breaks; without breaks it is one piece.
+/// Divides the time from `t0` to `t_end` at the breaks; without breaks there is one piece.
 pub(super) fn pieces<S: Scalar>(breaks: &[S], t0: S, t_end: S) -> Vec<Piece<S>> {
     let (low, high) = if t_end < t0 { (t_end, t0) } else { (t0, t_end) };
-    // Closer than this times are one.
+    // Times closer than this are equal.
     let blur = S::epsilon().ldexp(3) * S::max(low.abs(), high.abs());
     let mut cuts: Vec<S> = breaks.iter().copied().filter(|b| *b > low + blur && *b < high - blur).collect();
     cuts.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
@@ -188,13 +187,13 @@ pub struct Driven<'a, S: Scalar> {
 }
 
 impl<'a, S: Scalar> Driven<'a, S> {
-    /// The model under the force.
+    /// Adds the force to a model.
     pub fn new(model: &'a dyn EulerLagrange<S>, force: &'a dyn Force<S>) -> Self {
         Self { model, force }
     }
 
-    /// [`rollout`](super::rollout) under the force, by any method. Energies are those of the model, which the force
-    /// changes; the variational method takes the force into its discrete equations (Marsden and West 2001, 3.2.1).
+    /// Does the same as [`rollout`](super::rollout) with the force, by any method. Energies are those of the model, which the force
+    /// changes; the variational method includes the force in its discrete equations (Marsden and West 2001, 3.2.1).
     pub fn rollout(&self, q: &[S], v: &[S], options: &RolloutOptions<S>) -> Rollout<S>
     where
         S: Integrable,
@@ -202,7 +201,7 @@ impl<'a, S: Scalar> Driven<'a, S> {
         adaptive_or_fixed(self.model, Some(self.force), q, v, options)
     }
 
-    /// [`rollout_in_pieces`](super::rollout_in_pieces) under the force.
+    /// Does the same as [`rollout_in_pieces`](super::rollout_in_pieces) with the force.
     pub fn rollout_in_pieces(
         &self,
         q: &[S],
@@ -216,23 +215,23 @@ impl<'a, S: Scalar> Driven<'a, S> {
         hand_over(self.model, Some(self.force), (q, v), options, take)
     }
 
-    /// [`rollout_fixed`](super::rollout_fixed) under the force.
+    /// Does the same as [`rollout_fixed`](super::rollout_fixed) with the force.
     pub fn rollout_fixed(&self, q: &[S], v: &[S], options: &RolloutOptions<S>) -> Rollout<S> {
         fixed(self.model, Some(self.force), q, v, options)
     }
 
-    /// [`Trajectory::energy_balance`] with the work of the force.
+    /// Does the same as [`Trajectory::energy_balance`], including the work of the force.
     ///
     /// # Errors
-    /// [`RolloutError::Invalid`] if there is no sample, or a sample at which the model or the force cannot be evaluated.
+    /// [`RolloutError::Invalid`] if there is no sample, or the model or the force cannot be evaluated at a sample.
     pub fn energy_balance(&self, trajectory: &Trajectory<S>) -> Result<EnergyBalance<S>, RolloutError> {
         EnergyBalance::of(trajectory, self.model, Some(self.force))
     }
 
-    /// Accelerations `(n)` of one state at time `t`, for external solvers.
+    /// Computes the accelerations, `(n)`, of one state at time `t`, for external solvers.
     ///
     /// # Errors
-    /// [`MechanicsError`] of the model; a force that is not finite.
+    /// [`MechanicsError`] of the model; also if the force is not finite.
     pub fn acceleration(&self, t: S, q: &[S], v: &[S]) -> Result<Vec<S>, MechanicsError> {
         let (mut terms, mut force) = (Terms::default(), vec![<S as Real>::zero(); q.len()]);
         self.model.terms_at(&[t], q, v, Request::ACCELERATION, &mut terms)?;
@@ -287,7 +286,7 @@ mod tests {
         assert_eq!(ends(0.25, 0.5), [0.25]);
         assert_eq!(ends(2.0, 2.0), [0.0]);
         let cut = pieces(&breaks, 0.0, 3.0);
-        // Before a break for the piece that ends there, at it for the piece that begins.
+        // The piece before a break evaluates just before it, and the piece after the break at it.
         assert!(cut[0].time(1.0) < 1.0 && cut[1].time(1.0 - 1e-16) == 1.0 && cut[2].time(3.0) < 3.0);
         assert_eq!(pieces(&[], -1.0, 2.0)[0].time(2.0), 2.0);
     }

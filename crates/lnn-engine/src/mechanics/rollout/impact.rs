@@ -1,4 +1,4 @@
-//! Effects of an event on a motion: it is recorded, ends the motion, or changes its velocities by an impact.
+//! Effects of an event on a motion: it is recorded, ends the motion, or changes the velocities in an impact.
 
 use super::crossing::{Dense, Found, Watcher, side};
 use super::event::{Event, Impact, Occurrence, When};
@@ -9,27 +9,27 @@ use crate::lagrangian::{Manifold, MechanicsError, Request, dot, project};
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar};
 
-/// The impacts of an event so far.
+/// The previous impacts of an event.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Flights<S> {
-    /// Time of the last one, and the time between it and the one before.
+    /// Time of the last impact, and the time between the last two.
     last: Option<S>,
     between: Option<S>,
-    /// Index of the first of the events that follow each other faster than time resolves, and their number.
+    /// Index of the first impact in a sequence that is faster than the resolution of time, and the number of these impacts.
     since: Option<usize>,
     quick: usize,
 }
 
 impl<S: Scalar> Watcher<'_, S> {
-    /// `true` if the motion does not simply go on where a crossing happens: at an impact, and where it ends.
+    /// Returns `true` if a crossing interrupts the motion: an impact, or an event that ends it.
     pub(super) fn interrupts(&self, found: &Found<S>) -> bool {
         let Event { restitution, last, .. } = &self.events[found.event];
         let ends = last.is_some_and(|last| self.counts[found.event] + 1 >= last);
         restitution.is_some() || ends || self.happened.len() >= self.most
     }
 
-    /// The first event within a step that interrupts the motion, and its share of the step. Earlier ones are marked, with their states
-    /// projected onto the constraints.
+    /// Returns the first event within a step that interrupts the motion, and its fraction of the step. Earlier ones are recorded, with
+    /// their states projected onto the constraints.
     pub(super) fn interruption(
         &mut self,
         manifold: Option<&dyn Manifold<S>>,
@@ -46,24 +46,24 @@ impl<S: Scalar> Watcher<'_, S> {
             dense(from, &mut state);
             let mut shown = state.clone();
             let (q, v) = shown.split_at_mut(n);
-            // It stays where it is if the constraints are too far away.
+            // The state is left unchanged if it is too far from the constraints.
             let _ = manifold.map(|manifold| project(manifold, q, v));
             self.mark(found, time(from), [&state, &shown]);
         }
         None
     }
 
-    /// Applies a crossing that does not interrupt the motion, at a state that is recorded as `shown`.
+    /// Records a crossing that does not interrupt the motion, with the state `shown`.
     pub(super) fn mark(&mut self, found: Found<S>, t: S, [state, shown]: [&[S]; 2]) {
         self.record(found.event, t, shown, None);
         self.follow(t, state);
         self.goes_on(found, !found.above);
     }
 
-    /// Applies a crossing at a time and state `(q, v)`, whose velocities an impact changes.
+    /// Applies a crossing at a time and state `(q, v)`; an impact changes the velocities.
     ///
     /// # Errors
-    /// [`RolloutError::Event`] for an undetermined impact, or for events that accumulate; those of the model.
+    /// [`RolloutError::Event`] if an impact is not determined or impacts accumulate; errors of the model.
     pub(super) fn strike(&mut self, found: Found<S>, t: S, state: &mut [S]) -> Result<(), RolloutError> {
         let Found { event, above, .. } = found;
         if self.happened.len() >= self.most {
@@ -80,14 +80,14 @@ impl<S: Scalar> Watcher<'_, S> {
         Ok(())
     }
 
-    /// After an event the motion is on a side of its zero.
+    /// Sets the side of zero on which the motion continues after an event.
     fn goes_on(&mut self, found: Found<S>, above: bool) {
         self.fired = Some(found.event);
         self.sides[found.event] = Some(above);
         self.next.clone_from(&self.sides);
     }
 
-    /// Updates the sides to those of a state. An event that is still to be found keeps its side and is found at the start of the next step.
+    /// Updates the sides for a state. An event that is not detected yet keeps its side, so that it is found at the start of the next step.
     pub(super) fn follow(&mut self, t: S, state: &[S]) {
         let (q, v) = state.split_at(self.normal.len());
         for event in 0..self.events.len() {
@@ -107,13 +107,13 @@ impl<S: Scalar> Watcher<'_, S> {
         self.over |= self.events[event].last.is_some_and(|last| self.counts[event] >= last);
     }
 
-    /// The error of an event at a time and state.
+    /// Returns the error for an event at a time and state.
     fn refused(&self, event: usize, t: S, state: &[S], problem: impl Into<String>) -> RolloutError {
         let (event, state) = (self.events[event].name.clone(), state.iter().map(|x| x.to_f64()).collect());
         RolloutError::Event { t: t.to_f64(), state, event, problem: problem.into() }
     }
 
-    /// Changes the velocities by an impact and records it.
+    /// Changes the velocities in an impact and records it.
     fn impact(
         &mut self,
         (event, above): (usize, bool),
@@ -138,7 +138,7 @@ impl<S: Scalar> Watcher<'_, S> {
             let problem = format!("expected a coefficient of restitution from 0 to 1, found {e}");
             return Err(self.refused(event, t, state, problem));
         }
-        // Rounding may find a crossing on the way back.
+        // Because of rounding, a crossing may be found after the velocity has already reversed.
         if (speed < zero) == above {
             let change = (one + e) * speed / inverse;
             state[n..].iter_mut().zip(&direction).for_each(|(v, direction)| *v -= change * *direction);
@@ -158,7 +158,8 @@ impl<S: Scalar> Watcher<'_, S> {
         }
     }
 
-    /// The energy of a state, and the change of its velocities by a unit impulse along the normal, which constraints allow: `M^-1 n`.
+    /// Computes the energy of a state, and the change of its velocities by a unit impulse along the normal within the constraints: `M^-1
+    /// n`.
     fn answer(&mut self, t: S, (q, v): (&[S], &[S])) -> Result<(S, Vec<S>), MechanicsError> {
         let terms = &mut self.terms;
         self.model.terms_at(&[t], q, v, Request::ACCELERATION | Request::ENERGY, terms)?;
@@ -168,12 +169,12 @@ impl<S: Scalar> Watcher<'_, S> {
         Ok((energy, terms.acceleration.clone()))
     }
 
-    /// Reports when the impacts of an event accumulate, if they do; impacts that time does not resolve are then discarded.
+    /// Returns the error message if the impacts of an event accumulate; impacts that are not resolved in time are then removed.
     fn accumulates(&mut self, event: usize, t: S) -> Option<String> {
         let Flights { last, between, since, quick } = &mut self.flights[event];
         let now = t - last.replace(t)?;
         let ratio = between.replace(now).filter(|before| *before > now).map(|before| now / before);
-        // Near a surface, distances grow with the square of time.
+        // Near a surface, distances are quadratic in time.
         if now > Real::sqrt(S::epsilon()) * S::max(t.abs(), self.dt) {
             (*since, *quick) = (None, 0);
             return None;
@@ -190,7 +191,7 @@ impl<S: Scalar> Watcher<'_, S> {
     }
 }
 
-/// The error of a state that the model refuses.
+/// Returns the error for a state at which the model fails.
 fn failed<S: Scalar>(error: MechanicsError, t: S, state: &[S]) -> RolloutError {
     into_error(StepFailure::Model(error), t.to_f64(), state.iter().map(|x| x.to_f64()).collect(), 0.0)
 }

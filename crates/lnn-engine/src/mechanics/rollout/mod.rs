@@ -1,22 +1,23 @@
 //! Integrators and trajectories: from `(q, v)` at `t0` to samples at `t0 + k dt`.
 //!
-//! A roll-out integrates `dq/dt = v`, `dv/dt = a(q, v)` with an explicit Runge-Kutta method of Dormand and Prince (order 5 or 8) under
-//! error control, or Hamilton's equations of the same Lagrangian with a symplectic method of fixed step (implicit midpoint, Gauss
-//! collocation, variational). When a model fails, the valid part of the trajectory is kept, and a [`RolloutError`] says where and why.
-//! Every method except the variational one integrates models with friction; [`Trajectory::energy_balance`] says where the energy went.
-//! [`Driven`] is a model under a [`Force`] `Q(t, q, v)` from outside: a motor, a controller, or a recording ([`SampledForce`]). Angles stay
-//! continuous (never wrapped) in the output; a model that needs them wrapped wraps them itself.
+//! A roll-out integrates `dq/dt = v`, `dv/dt = a(q, v)` with an explicit Runge-Kutta method of Dormand and Prince (order 5 or 8) with error
+//! control, or Hamilton's equations of the same Lagrangian with a symplectic fixed-step method (implicit midpoint, Gauss collocation,
+//! variational). If a model fails, the valid part of the trajectory is kept, and a [`RolloutError`] states where and why. All methods
+//! except the variational one can integrate models with friction; [`Trajectory::energy_balance`] reports how the energy changed. [`Driven`]
+//! adds an external [`Force`] `Q(t, q, v)` to a model: a motor, a controller, or a recording ([`SampledForce`]). Angles in the output are
+//! continuous (never wrapped); a model that needs wrapped angles wraps them itself.
 //!
-//! The motion of a model under constraints stays on them: the adaptive methods project their states and samples, the symplectic ones have
-//! their constrained forms. A start is projected onto the constraints if it lies within a thousandth of its size, and refused otherwise.
+//! The motion of a model with constraints satisfies them: the adaptive methods project their states and samples, and the symplectic ones
+//! have constrained forms. An initial state is projected onto the constraints if its distance is below a thousandth of its size, and
+//! rejected otherwise.
 //!
-//! An [`Event`] is a zero of some number along the motion: it is recorded with its time and state, may end the motion, or is an impact on a
-//! surface. It does not move the samples.
+//! An [`Event`] is a zero of a function along the motion. It is recorded with its time and state, and may end the motion or be an impact on
+//! a surface. The sample times do not change.
 //!
-//! [`rollout_in_pieces`] hands the samples over instead of keeping them, for motions longer than the memory.
+//! [`rollout_in_pieces`] passes the samples to a callback instead of storing them, for motions that do not fit in memory.
 //!
-//! Adaptive integration is available in the precisions of the solver, [`Integrable`]: `f32` and `f64`; fixed steps in every precision by
-//! [`rollout_fixed`].
+//! Adaptive integration is available for the number types [`Integrable`], `f32` and `f64`; [`rollout_fixed`] integrates with fixed steps in
+//! every precision.
 
 mod adaptive;
 mod between;
@@ -54,7 +55,7 @@ pub use pieces::{Ending, EnergyBalance, rollout_in_pieces};
 pub use run::{Motion, Rollout, rollout, rollout_fixed};
 pub use trajectory::{StepCounts, Trajectory};
 
-// For the packages of this repository.
+// These are for the other packages of this repository.
 #[doc(hidden)]
 pub use {
     ensemble::{rollout_each, rollout_together},

@@ -5,7 +5,7 @@ use crate::scalar::{Real, Scalar};
 
 type Force = fn(&[f64], &[f64], &mut [f64]) -> Result<f64, MechanicsError>;
 
-/// A system with the constant mass matrix 1, given by its potential, acceleration and possible failures.
+/// A system whose mass matrix is the identity, given by its potential, acceleration and possible failures.
 pub(crate) struct Toy {
     n: usize,
     /// `(q, v) -> (acceleration, potential)`.
@@ -94,7 +94,7 @@ pub(crate) const FOUR: Toy = Toy {
     },
 };
 
-/// Free fall whose mass matrix is singular below `q = -1`.
+/// Free fall with a mass matrix that is singular below `q = -1`.
 pub(crate) const SINGULAR: Toy = Toy {
     n: 1,
     force: |q, _, a| {
@@ -103,7 +103,7 @@ pub(crate) const SINGULAR: Toy = Toy {
     },
 };
 
-/// Free fall whose acceleration is not a number below `q = -1`.
+/// Free fall with an acceleration that is `NaN` below `q = -1`.
 pub(crate) const BROKEN: Toy = Toy {
     n: 1,
     force: |q, _, a| {
@@ -112,7 +112,7 @@ pub(crate) const BROKEN: Toy = Toy {
     },
 };
 
-/// `q'' = 2 q^3`: from `q = v = 1` it is `1 / (1 - t)`.
+/// `q'' = 2 q^3`; the solution from `q = v = 1` is `1 / (1 - t)`.
 pub(crate) const EXPLODING: Toy = Toy {
     n: 1,
     force: |q, _, a| {

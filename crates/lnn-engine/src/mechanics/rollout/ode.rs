@@ -1,6 +1,6 @@
-//! Adapter to `ode_solvers`: the only file that names it.
+//! Adapter to `ode_solvers`, the only file that uses it.
 //!
-//! Its pitfalls, and their remedies:
+//! Its pitfalls and how this file handles them:
 //! - A right-hand side cannot fail: the first error of an attempt is latched and `NaN` returned. An attempted step with
 //!   a failed stage is then rejected and tried shorter; the error ends the integration only once steps underflow.
 //! - Its dense output extrapolates the last sample, panics or hangs for some intervals, and is lost for failures: only
@@ -25,20 +25,21 @@ use ode_solvers::dop_shared::{FloatNumber, IntegrationError};
 use ode_solvers::{DVector, Dop853, Dopri5, OutputType, SVector, System};
 use std::cell::RefCell;
 
-/// Receives sample `k` with its state, and says whether to continue.
+/// Receives sample `k` with its state, and returns whether to continue.
 pub(super) type Output<'a, S> = dyn FnMut(usize, &[S]) -> bool + 'a;
 
-/// Receives elapsed time, weight and state at the nodes of a quadrature within every step.
+/// Receives elapsed time, weight and state at quadrature nodes within every step.
 pub(super) type StepNodes<'a, S> = dyn FnMut(S, S, &[S]) + 'a;
 
-/// Scans a step for events, given its elapsed time, size and dense output; returns the share of it at which the first one happens.
+/// Searches a step for events, given its elapsed time, size and dense output; returns the fraction of the step at which the first one
+/// happens.
 pub(super) type Scan<'a, S> = dyn FnMut(S, S, &mut Dense<'_, S>) -> Option<S> + 'a;
 
-/// The receivers of an integration's results.
+/// The receivers of the results of an integration.
 pub(super) type Receivers<'a, 'f, S> =
     (&'a mut Output<'f, S>, Option<&'a mut StepNodes<'f, S>>, Option<&'a mut Scan<'f, S>>);
 
-/// Projects the state at the end of a step of some length onto its manifold, and returns the distance in units of the tolerance.
+/// Projects the state at the end of a step of some length onto its manifold; returns the distance in units of the tolerance.
 pub(super) type Project<'a, S, E> = dyn FnMut(S, &mut [S]) -> Result<S, E> + 'a;
 
 /// The adaptive methods.
@@ -48,13 +49,13 @@ pub(super) enum Adaptive {
     Dop853,
 }
 
-/// Problem to integrate.
+/// An integration problem.
 pub struct Integration<'a, S> {
     pub(super) method: Adaptive,
     pub(super) rtol: S,
     pub(super) atol: S,
     pub(super) max_steps: usize,
-    /// Size of the first attempt; 0 leaves it to the solver.
+    /// Size of the first attempt; 0 lets the solver choose it.
     pub(super) first_step: S,
     /// `true` if the right-hand side depends on time.
     pub(super) timed: bool,
@@ -64,18 +65,18 @@ pub struct Integration<'a, S> {
     pub(super) samples: &'a dyn Times<S>,
 }
 
-/// Why an integration ended early.
+/// The reason why an integration ended early.
 #[derive(Debug)]
 pub enum EarlyEnd<E> {
-    /// The right-hand side fails ahead, however short the step.
+    /// The right-hand side fails beyond the last step, however short the next one.
     Failed(E),
     /// The error estimate requires steps that do not advance the time.
     Underflow,
-    /// No attempts left.
+    /// The allowed number of attempts is used up.
     TooManySteps,
     /// The receiver accepts no more samples.
     Stopped,
-    /// An event happens.
+    /// An event interrupts the motion.
     Event,
 }
 
@@ -89,13 +90,13 @@ pub struct Ran<S, E> {
     pub(super) ended: Option<EarlyEnd<E>>,
 }
 
-/// The number types of adaptive integration and of roll-outs: `f32` and `f64`. Other numbers are integrated by fixed steps
+/// Number types that support adaptive integration and roll-outs: `f32` and `f64`. Other numbers are integrated with fixed steps
 /// ([`rollout_fixed`](super::rollout_fixed)).
 pub trait Integrable: Integrates {}
 
-/// Code that is compiled in this crate, once for each of these number types.
+/// Code that this crate compiles once for each of these number types.
 pub trait Integrates: Scalar {
-    /// A motion from its start, sample by sample.
+    /// Integrates a motion from its start, sample by sample.
     fn roll_out(
         model: &dyn EulerLagrange<Self>,
         force: Option<&dyn Force<Self>>,
@@ -104,7 +105,7 @@ pub trait Integrates: Scalar {
         receivers: run::Receivers<'_, '_, Self>,
     ) -> (StepCounts, Option<RolloutError>);
 
-    /// The solution of differential equations.
+    /// Solves differential equations.
     fn integrate<E>(
         task: &Integration<'_, Self>,
         f: &mut Rhs<'_, Self, E>,
@@ -135,7 +136,7 @@ macro_rules! integrable {
                     project: Option<&mut Project<'_, Self, E>>,
                     receivers: Receivers<'_, '_, Self>,
                 ) -> Ran<Self, E> {
-                    // Small states live on the stack.
+                    // Small states are stored on the stack.
                     match task.start.len() {
                         2 => integrate(task, |y| SVector::<Self, 2>::from_column_slice(y), f, project, receivers),
                         4 => integrate(task, |y| SVector::<Self, 4>::from_column_slice(y), f, project, receivers),
@@ -149,7 +150,7 @@ macro_rules! integrable {
 }
 integrable!(f32 f64);
 
-/// Stages after the first of both methods.
+/// Returns the number of stages after the first one.
 const fn stages(method: Adaptive) -> usize {
     match method {
         Adaptive::Dopri5 => 6,
@@ -157,7 +158,7 @@ const fn stages(method: Adaptive) -> usize {
     }
 }
 
-/// Calls per accepted step that are not stages of its attempt.
+/// Returns the number of calls per accepted step that are not stages of the attempt.
 const fn closing_calls(method: Adaptive) -> usize {
     match method {
         Adaptive::Dopri5 => 0,
@@ -165,7 +166,7 @@ const fn closing_calls(method: Adaptive) -> usize {
     }
 }
 
-/// Everything that is observed while a solver runs.
+/// Observes the solver while it runs.
 struct Observer<'a, 'f, S, E> {
     task: &'a Integration<'a, S>,
     f: &'a mut Rhs<'f, S, E>,
@@ -174,10 +175,10 @@ struct Observer<'a, 'f, S, E> {
     nodes: Option<&'a mut StepNodes<'f, S>>,
     scan: Option<&'a mut Scan<'f, S>>,
     rule: Tableau<S>,
-    /// Stages of the last calls, the newest at `calls - 1`, in a ring of `ring` rows.
+    /// Slopes of the last calls in a ring of `ring` rows, the newest at `calls - 1`.
     recent: Vec<S>,
     calls: usize,
-    /// Calls of a run before its first attempt, and the time of the last call.
+    /// Number of calls in a run before its first attempt, and the time of the last call.
     opening: usize,
     last_call: S,
     statistics: StepCounts,
@@ -191,15 +192,15 @@ struct Observer<'a, 'f, S, E> {
     /// First failure since the last accepted step, and the one before that step.
     failure: Option<E>,
     earlier: Option<E>,
-    /// An accepted step failed at its end: try again with this size.
+    /// Set if an accepted step failed at its end: the step size to try next.
     retry: Option<S>,
-    /// The state was projected: continue from it, beginning with this size.
+    /// Set if the state was projected: the first step size from the new state.
     restart: Option<S>,
-    /// The time does not advance any more.
+    /// `true` once the time no longer advances.
     stuck: bool,
-    /// The receiver of the samples takes no more.
+    /// `true` once the receiver accepts no more samples.
     stopped: bool,
-    /// An event happens at the state.
+    /// `true` if an event happens at the state.
     event: bool,
     interpolant: Interpolant<S>,
     slopes: Vec<S>,
@@ -207,7 +208,7 @@ struct Observer<'a, 'f, S, E> {
 }
 
 impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
-    /// At the start, where the slope and the first sample behind it are known.
+    /// Creates an observer at the start, given the slope and the index of the first sample after it.
     fn new(
         task: &'a Integration<'a, S>,
         f: &'a mut Rhs<'f, S, E>,
@@ -248,12 +249,12 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         }
     }
 
-    /// Prepares for a run of the solver; returns the attempts that it may make.
+    /// Prepares for a run of the solver; returns the allowed number of attempts.
     fn open_run(&mut self, first_step: S) -> usize {
         self.calls = 0;
         let attempts = self.statistics.accepted + self.statistics.rejected;
         let left = self.task.max_steps.saturating_sub(attempts);
-        // Without a first step, the solver evaluates two more states to choose one.
+        // Without a given first step, the solver evaluates two more states to choose one.
         self.opening = match () {
             () if left == 0 => 0,
             () if first_step == <S as Real>::zero() => 3,
@@ -262,7 +263,7 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         left
     }
 
-    /// Counts the rejected attempts of a run by its calls.
+    /// Derives the number of rejected attempts in a run from its calls.
     fn count_rejected(&mut self, accepted_before: usize) {
         let accepted = self.statistics.accepted - accepted_before;
         let closing = accepted * closing_calls(self.task.method);
@@ -270,8 +271,8 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         self.statistics.rejected += attempts - accepted;
     }
 
-    /// The first step of another run, if the one that began at an elapsed time was stopped to continue from another state or by a shorter
-    /// step.
+    /// Returns the first step of the next run, if the run that began at an elapsed time was stopped to continue from another state or with
+    /// a shorter step.
     fn continuation(&mut self, began: S, end: S) -> Option<S> {
         if let Some(step) = self.restart.take() {
             let first_step = Real::min(step, end - self.elapsed);
@@ -280,7 +281,7 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
             }
         }
         let failed = self.retry.take()?;
-        // The step counted as accepted was not taken.
+        // The last step was counted as accepted but not taken.
         self.statistics.accepted -= 1;
         self.statistics.rejected += 1;
         let first_step = failed * S::of_f64(RETRIED_SHARE);
@@ -291,14 +292,14 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         None
     }
 
-    /// Why the last run ended early, if it did; otherwise the remaining samples are delivered.
+    /// Returns why the last run ended early, if it did; otherwise delivers the remaining samples.
     fn ending(&mut self, result: Result<(), IntegrationError>) -> Option<EarlyEnd<E>> {
         match result {
             _ if self.stopped => Some(EarlyEnd::Stopped),
             _ if self.event => Some(EarlyEnd::Event),
             _ if self.stuck => Some(self.cause().map_or(EarlyEnd::Underflow, EarlyEnd::Failed)),
             Ok(()) => {
-                // The last step may end one rounding short of the end.
+                // Because of rounding, the last step may end just before the end.
                 while self.next < self.task.samples.len() {
                     let _ = (self.output)(self.next, &self.state);
                     self.next += 1;
@@ -314,7 +315,7 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         let x = self.stage_time(x);
         self.last_call = x;
         if self.failure.is_some() && y.iter().any(|x| !x.is_finite()) {
-            // An earlier failure of this attempt has made the state invalid.
+            // An earlier failure in this attempt has already made the state invalid.
             dy.fill(S::nan());
         } else if y == self.state.as_slice() && (!self.task.timed || x == self.elapsed) {
             dy.copy_from_slice(&self.slope);
@@ -330,8 +331,8 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         self.calls += 1;
     }
 
-    /// The time of a stage. Stage 12 of the method of order 8 is declared at the start of the step and is at its end;
-    /// stage 11, evaluated just before, is at 6/7 of it.
+    /// Returns the time of a stage. The table of the method of order 8 puts stage 12 at the start of the step, but it is at its end; stage
+    /// 11, evaluated just before, is at 6/7 of the step.
     fn stage_time(&self, x: S) -> S {
         if self.task.method == Adaptive::Dop853 && self.calls >= self.opening && x == self.elapsed {
             self.elapsed + (self.last_call - self.elapsed) * S::ratio(7, 6)
@@ -340,12 +341,12 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         }
     }
 
-    /// Rows of `recent`: the calls of one accepted step.
+    /// Returns the number of rows of `recent`: the calls of one accepted step.
     fn ring(&self) -> usize {
         stages(self.task.method) + closing_calls(self.task.method)
     }
 
-    /// Takes an accepted step; `true` stops the solver.
+    /// Processes an accepted step; returns `true` to stop the solver.
     fn accepted(&mut self, x: S, y: &[S], slope: &[S]) -> bool {
         self.statistics.accepted += 1;
         let h = x - self.elapsed;
@@ -353,7 +354,7 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
             self.stuck = true;
             return true;
         }
-        // Failures of rejected attempts are harmless; one of the closing evaluation is not.
+        // Failures in rejected attempts are harmless, but not a failure in the last evaluation of a step.
         if slope.iter().any(|x| !x.is_finite()) {
             self.retry = Some(h);
             return true;
@@ -404,8 +405,8 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         self.stopped || projected.is_some_and(|(drift, moved)| self.restarts(x, h, drift, moved))
     }
 
-    /// Continues from the projection of a state that has drifted by more than the tolerance; `true` stops the solver, which does not know
-    /// about it.
+    /// Restarts from the projection of a state that has drifted by more than the tolerance. Returns `true` to stop the solver, which does
+    /// not know the new state.
     fn restarts(&mut self, x: S, h: S, drift: S, moved: Vec<S>) -> bool {
         if drift <= <S as Real>::one() || self.next >= self.task.samples.len() {
             return false;
@@ -420,7 +421,7 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         true
     }
 
-    /// Ends the interpolant's step at an event within it, if there is one.
+    /// Ends the step of the interpolant at an event within it, if there is one.
     fn ends_at_event(&mut self, h: S) -> bool {
         let (Some(scan), interpolant) = (&mut self.scan, &self.interpolant) else { return false };
         let Some(share) = scan(self.elapsed, h, &mut |share, state| interpolant.evaluate(share, state)) else {
@@ -438,7 +439,7 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         true
     }
 
-    /// Passes on the nodes of a quadrature within the first share of the interpolant's step.
+    /// Passes quadrature nodes to the receiver within the accepted first fraction of the interpolant's step.
     fn visit_nodes(&mut self, h: S, whole: S) {
         let Some(nodes) = &mut self.nodes else { return };
         let part = S::ratio(1, QUADRATURE_PANELS as i32);
@@ -451,7 +452,7 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         }
     }
 
-    /// Prepares the interpolant of the step to `y`; `false` if an evaluation it needs fails.
+    /// Prepares the interpolant of the step to `y`; returns `false` if a required evaluation fails.
     fn interpolate(&mut self, h: S, y: &[S]) -> bool {
         let dim = y.len();
         let ring = self.ring();
@@ -474,13 +475,13 @@ impl<'a, 'f, S: Scalar, E> Observer<'a, 'f, S, E> {
         }
     }
 
-    /// The failure that made steps shrink.
+    /// Returns the failure that caused the steps to shrink.
     fn cause(&mut self) -> Option<E> {
         self.failure.take().or_else(|| self.earlier.take())
     }
 }
 
-/// The observer as the solver sees it.
+/// The observer in the form that the solver requires.
 struct Watched<'w, 'a, 'f, S, E>(&'w RefCell<Observer<'a, 'f, S, E>>);
 
 impl<S, D, E> System<S, OVector<S, D>> for Watched<'_, '_, '_, S, E>
@@ -498,7 +499,7 @@ where
     }
 }
 
-/// Runs the solver, and again from every state that its observer has changed, until the last sample.
+/// Runs the solver, restarting it from every state that its observer has changed, until the last sample.
 fn integrate<S, D, E>(
     task: &Integration<'_, S>,
     vector: impl Fn(&[S]) -> OVector<S, D>,
@@ -560,10 +561,10 @@ where
     }
 }
 
-/// The slope at the start, and the first sample behind it: those at the start are delivered.
+/// Computes the slope at the start, delivers the samples there, and returns the index of the first one after it.
 ///
 /// # Errors
-/// The failure of the right-hand side at the start; a receiver that takes no more samples.
+/// The right-hand side fails at the start, or the receiver accepts no more samples.
 fn begin<S: Scalar, E>(
     task: &Integration<'_, S>,
     f: &mut Rhs<'_, S, E>,
@@ -582,8 +583,8 @@ fn begin<S: Scalar, E>(
     Ok((slope, next))
 }
 
-/// One run of the solver from `elapsed` to `end`, its own defaults except for stiffness detection (off: the number of
-/// steps is limited instead) and the number of steps.
+/// Runs the solver once from `elapsed` to `end` with its default settings, except that stiffness detection is off, because the number of
+/// steps is limited instead.
 fn run<S, D, E>(
     task: &Integration<'_, S>,
     watched: Watched<'_, '_, '_, S, E>,
@@ -601,7 +602,7 @@ where
     OVector<S, D>: std::ops::Mul<S, Output = OVector<S, D>>,
 {
     let number = <S as Scalar>::of_f64;
-    // A component that stays 0 would have the error 0/0.
+    // For a component that stays 0, the error would be 0/0.
     let smallest = <S as Scalar>::min_positive();
     let atol = if task.atol > smallest { task.atol } else { smallest };
     let max_steps = u32::try_from(max_steps).unwrap_or(u32::MAX - 1);
@@ -637,11 +638,11 @@ where
 
 #[cfg(test)]
 mod tests {
-    //! Dense output of single steps; samples at equal times.
+    //! Tests the dense output of single steps, and samples at equal times.
 
     use super::*;
 
-    /// Samples of `y' = -y` from 1.
+    /// Returns samples of `y' = -y` from 1.
     fn decay(method: Adaptive, tolerance: f64, first_step: f64, samples: &Vec<f64>) -> (Vec<f64>, StepCounts) {
         let task = Integration {
             method,
@@ -675,7 +676,7 @@ mod tests {
         (got, ran.statistics)
     }
 
-    /// Largest error of the samples of one single step of size `h`.
+    /// Returns the largest error of the samples of a single step of size `h`.
     fn single_step(method: Adaptive, h: f64) -> f64 {
         let samples: Vec<f64> = (0..=20).map(|k| h * f64::from(k) / 20.0).collect();
         let (got, statistics) = decay(method, 1e6, h, &samples);
@@ -688,7 +689,7 @@ mod tests {
     fn interpolation_is_right_inside_a_single_step_with_its_order() {
         for (method, order, bound) in [(Adaptive::Dopri5, 4.0, 2e-4), (Adaptive::Dop853, 7.0, 2e-7)] {
             assert!(single_step(method, 0.5) < bound, "{method:?}: {:e}", single_step(method, 0.5));
-            // Local error h^(order + 1).
+            // The local error is proportional to h^(order + 1).
             let slope = (single_step(method, 0.5) / single_step(method, 0.25)).log2();
             assert!((slope - order - 1.0).abs() < 0.35, "{method:?}: {slope}");
         }

@@ -5,11 +5,11 @@ use super::{Event, RolloutError};
 use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 
-/// Integrators: explicit Runge-Kutta methods with step size control, and structure-preserving ones of fixed step.
+/// Integrators: explicit Runge-Kutta methods with step size control, and structure-preserving fixed-step methods.
 ///
-/// The latter are implicit and symplectic in `(q, p)`, `p = dL/dv`, for every Lagrangian with a regular mass matrix:
-/// the energy error stays bounded over long times, where adaptive methods drift. See [`RolloutOptions::step`]. A motion with
-/// friction has no energy to keep: [`Integrator::Variational`] refuses it, the Gauss methods keep their order.
+/// The latter are implicit and symplectic in `(q, p)`, `p = dL/dv`, for every Lagrangian with a regular mass matrix. Their energy error
+/// stays bounded over long times, whereas adaptive methods drift. See [`RolloutOptions::step`]. Motion with friction conserves no energy:
+/// [`Integrator::Variational`] rejects it, and the Gauss methods keep their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
@@ -29,11 +29,11 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// Every integrator.
+    /// All integrators.
     pub const ALL: [Self; 6] =
         [Self::Dopri5, Self::Dop853, Self::Midpoint, Self::Gauss4, Self::Gauss6, Self::Variational];
 
-    /// Its name, as in a configuration.
+    /// Returns its name in configurations.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Dopri5 => "dopri5",
@@ -45,7 +45,7 @@ impl Integrator {
         }
     }
 
-    /// What it is, in a few words.
+    /// Describes it in a few words.
     pub const fn about(self) -> &'static str {
         match self {
             Self::Dopri5 => "Dormand and Prince, order 5, error control",
@@ -57,35 +57,35 @@ impl Integrator {
         }
     }
 
-    /// `true` if steps are fixed and the motion is symplectic.
+    /// Returns `true` for symplectic methods with fixed steps.
     pub const fn is_structure_preserving(self) -> bool {
         !matches!(self, Self::Dopri5 | Self::Dop853)
     }
 }
 
-/// Box in which a trajectory must stay; the bounds of a training range or of a chart.
+/// A box in which a trajectory must stay, such as the bounds of training data or of a chart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Domain<S> {
     bounds: Vec<Option<(S, S)>>,
 }
 
 impl<S: Scalar> Domain<S> {
-    /// Bounds `(lower, upper)` of every component of `(q, v)`; `None` is unbounded, as periodic coordinates are.
+    /// Creates a domain from bounds `(lower, upper)` of every component of `(q, v)`; `None` means unbounded, as for periodic coordinates.
     pub fn new(bounds: Vec<Option<(S, S)>>) -> Self {
         Self { bounds }
     }
 
-    /// Number of components `2n`.
+    /// Returns the number of components `2n`.
     pub(crate) fn len(&self) -> usize {
         self.bounds.len()
     }
 
-    /// Bounds of every component of `(q, v)`.
+    /// Returns the bounds of every component of `(q, v)`.
     pub fn bounds(&self) -> &[Option<(S, S)>] {
         &self.bounds
     }
 
-    /// First component of `(q, v)` outside its bounds, with the bounds.
+    /// Returns the first component of `(q, v)` outside its bounds, with the bounds.
     pub fn violation(&self, state: &[S]) -> Option<(usize, S, S)> {
         self.bounds.iter().zip(state).enumerate().find_map(|(index, (bounds, &x))| match *bounds {
             Some((lower, upper)) if !(x >= lower && x <= upper) => Some((index, lower, upper)),
@@ -93,7 +93,7 @@ impl<S: Scalar> Domain<S> {
         })
     }
 
-    /// The bounded component of `(q, v)` closest to a bound, relative to its width, with the bounds.
+    /// Returns the bounded component of `(q, v)` closest to a bound, relative to its width, with the bounds.
     pub(super) fn tightest(&self, state: &[S]) -> Option<(usize, S, S)> {
         let mut best: Option<(S, (usize, S, S))> = None;
         for (index, (bounds, &x)) in self.bounds.iter().zip(state).enumerate() {
@@ -135,11 +135,11 @@ impl<S: Scalar> Domain<S> {
 #[non_exhaustive]
 #[must_use]
 pub struct RolloutOptions<S> {
-    /// Time of the start.
+    /// Initial time.
     pub t0: S,
     /// Time of the last sample.
     pub t_end: S,
-    /// Distance of samples.
+    /// Sampling interval.
     pub dt: S,
     /// Integrator.
     pub method: Integrator,
@@ -147,21 +147,21 @@ pub struct RolloutOptions<S> {
     pub rtol: S,
     /// Absolute tolerance in the unit of each component.
     pub atol: S,
-    /// Longest step of the structure-preserving methods: the interval between samples is divided into equal steps no longer than it.
-    /// `None`: one step per sample. Adaptive methods choose their own.
+    /// Longest step of the structure-preserving methods: the interval between samples is divided into equal steps that are no longer.
+    /// `None` means one step per sample. Adaptive methods choose their own steps.
     pub step: Option<S>,
-    /// Attempts allowed.
+    /// Largest number of attempted steps.
     pub max_steps: usize,
-    /// Where the trajectory must stay.
+    /// Domain in which the trajectory must stay.
     pub domain: Option<Domain<S>>,
-    /// `true` to store the energy of every sample.
+    /// `true` to store the energy at every sample.
     pub energy: bool,
-    /// Zeros along the motion that are recorded, end it, or are impacts.
+    /// Zeros along the motion that are recorded, end it, or cause impacts.
     pub events: Vec<Event<S>>,
 }
 
 impl<S: Scalar> RolloutOptions<S> {
-    /// Learned motion as in the paper's tests: `Dopri5`, rtol 1e-6, atol 1e-8, from time 0.
+    /// Returns the options for learned motion as in the paper's tests: `Dopri5`, rtol 1e-6, atol 1e-8, from time 0.
     pub fn new(t_end: S, dt: S) -> Self {
         Self {
             t0: <S as Real>::zero(),
@@ -178,13 +178,13 @@ impl<S: Scalar> RolloutOptions<S> {
         }
     }
 
-    /// Ground truth: `Dop853` with rtol = atol = 1e-12, or sixteen roundings where the scalar is coarser.
+    /// Returns the options for ground truth: `Dop853` with rtol = atol = 1e-12, or sixteen rounding errors if the scalar is less precise.
     pub fn reference(t_end: S, dt: S) -> Self {
         let tolerance = S::max(S::of_f64(1e-12), S::epsilon().ldexp(4));
         Self { method: Integrator::Dop853, rtol: tolerance, atol: tolerance, ..Self::new(t_end, dt) }
     }
 
-    /// Sets the time of the start.
+    /// Sets the initial time.
     pub fn t0(self, t0: S) -> Self {
         Self { t0, ..self }
     }
@@ -194,7 +194,7 @@ impl<S: Scalar> RolloutOptions<S> {
         Self { t_end, ..self }
     }
 
-    /// Sets the distance of samples.
+    /// Sets the sampling interval.
     pub fn dt(self, dt: S) -> Self {
         Self { dt, ..self }
     }
@@ -209,33 +209,33 @@ impl<S: Scalar> RolloutOptions<S> {
         Self { rtol, atol, ..self }
     }
 
-    /// Sets the longest step of the structure-preserving methods; `None` is one step per sample.
+    /// Sets the longest step of the structure-preserving methods; `None` means one step per sample.
     pub fn step(self, step: impl Into<Option<S>>) -> Self {
         Self { step: step.into(), ..self }
     }
 
-    /// Sets how many steps may be attempted.
+    /// Sets the largest number of attempted steps.
     pub fn max_steps(self, max_steps: usize) -> Self {
         Self { max_steps, ..self }
     }
 
-    /// Sets where the trajectory must stay.
+    /// Sets the domain in which the trajectory must stay.
     pub fn domain(self, domain: impl Into<Option<Domain<S>>>) -> Self {
         Self { domain: domain.into(), ..self }
     }
 
-    /// Sets whether the energy of every sample is stored.
+    /// Sets whether the energy at every sample is stored.
     pub fn energy(self, energy: bool) -> Self {
         Self { energy, ..self }
     }
 
-    /// Sets the zeros along the motion that are recorded, end it, or are impacts.
+    /// Sets the zeros along the motion that are recorded, end it, or cause impacts.
     pub fn events(self, events: Vec<Event<S>>) -> Self {
         Self { events, ..self }
     }
 
-    /// Finest relative tolerance that the scalar supports, about nine of its roundings: 1e-6 in `f32`, 2e-15 in `f64`. Below
-    /// it steps shrink until they no longer advance the time, and never arrive.
+    /// Returns the finest relative tolerance that the scalar supports, about nine rounding errors: 1e-6 in `f32`, 2e-15 in `f64`. With a
+    /// finer one, steps shrink until they no longer advance the time.
     pub fn least_tolerance() -> S {
         S::of_f64(if S::epsilon().to_f64() > 1e-12 { LEAST_TOLERANCES.0 } else { LEAST_TOLERANCES.1 })
     }
@@ -243,7 +243,7 @@ impl<S: Scalar> RolloutOptions<S> {
     /// Checks the options for `n` coordinates.
     ///
     /// # Errors
-    /// [`RolloutError::Invalid`] naming the option.
+    /// [`RolloutError::Invalid`] with the name of the option.
     pub fn check(&self, n: usize) -> Result<(), RolloutError> {
         let invalid = |what, problem: String| Err(RolloutError::Invalid { what, problem });
         for (what, value) in [("t0", self.t0), ("t_end", self.t_end), ("dt", self.dt)] {
@@ -293,7 +293,7 @@ impl<S: Scalar> RolloutOptions<S> {
         }
         if self.method.is_structure_preserving() {
             let shortest = self.step.map_or(self.dt.abs(), |step| S::min(step, self.dt.abs()));
-            // Rounding aside.
+            // This ignores rounding.
             let steps = ((self.t_end - self.t0).abs() / shortest).to_f64() * (1.0 - 1e-6);
             if steps > self.max_steps as f64 {
                 let what = if self.step.is_some_and(|step| step < self.dt.abs()) { "step" } else { "dt" };
@@ -311,8 +311,8 @@ impl<S: Scalar> RolloutOptions<S> {
     }
 }
 
-/// Rounding of the quotient of time span and `dt`: one this close to a whole number is whole, for the times carry no more
-/// digits. From one half on the samples themselves cannot be distinguished.
+/// Returns the rounding error of the quotient of time span and `dt`: a quotient this close to an integer counts as one, because the times
+/// are not more accurate. From one half on, samples cannot be distinguished.
 pub(super) fn blur<S: Scalar>(options: &RolloutOptions<S>) -> S {
     let span = options.t_end - options.t0;
     S::epsilon().ldexp(2) * (options.t0.abs() + options.t_end.abs() + span.abs()) / options.dt.abs()

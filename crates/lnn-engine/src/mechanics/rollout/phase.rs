@@ -1,5 +1,5 @@
-//! A model in phase space: `p = dL/dv` and `dp/dt = dL/dq + Q` as functions of `(q, v)`, and the inverse from `p` to `v`; `Q` is friction,
-//! zero for a model that conserves its energy, and an external force, if one acts.
+//! A model in phase space: `p = dL/dv` and `dp/dt = dL/dq + Q` as functions of `(q, v)`, and the inverse map from `p` to `v`. `Q` consists
+//! of friction and an external force; it is zero for a model that conserves its energy if no force acts.
 
 use super::force::Piece;
 use super::thresholds::{MODEL_ROUNDINGS_LOG2, MOST_VELOCITY_SWEEPS};
@@ -15,20 +15,20 @@ pub(super) struct PhaseSpace<'a, S> {
     pub(super) n: usize,
     terms: Terms<S>,
     pub(super) workspace: Workspace<S>,
-    /// States evaluated.
+    /// Number of evaluated states.
     pub(super) evaluations: usize,
-    /// Iterations of implicit equations.
+    /// Number of iterations of implicit equations.
     pub(super) iterations: usize,
     points: Vec<S>,
     external: Vec<S>,
-    /// `true` if there are forces that are not in `L`.
+    /// `true` if some forces do not follow from `L`.
     damped: bool,
     /// `true` if the model depends on the time.
     timed: bool,
-    /// Times of the states that are evaluated.
+    /// Times of the evaluated states.
     times: Vec<S>,
     force: Option<&'a dyn Force<S>>,
-    /// Time at the start of the current step, and the times at which the force may be evaluated.
+    /// Time at the start of the current step, and the piece whose times are valid for the force.
     start: S,
     piece: Option<Piece<S>>,
 }
@@ -42,26 +42,26 @@ pub(super) struct Derivatives<S> {
     pub(super) mixed: Vec<S>,
     /// `dg_i/dq_j` at `(i, j)`.
     pub(super) stiffness: Vec<S>,
-    /// `dQ_i/dv_j` at `(i, j)`, zero for a model that conserves its energy.
+    /// `dQ_i/dv_j` at `(i, j)`; zero for a model that conserves its energy.
     pub(super) damping: Vec<S>,
 }
 
-/// Residual of an equation that is being solved.
+/// The residual of an equation during its solution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Defect<S> {
-    /// Largest residual relative to the terms of its own component.
+    /// Largest residual relative to the terms of the same component.
     pub(super) relative: S,
-    /// Largest residual relative to the largest term of all.
+    /// Largest residual relative to the largest of all terms.
     pub(super) overall: S,
 }
 
 impl<S: Scalar> Defect<S> {
-    /// Before the first evaluation.
+    /// Returns the defect before the first evaluation.
     pub(super) fn unknown() -> Self {
         Self { relative: S::infinity(), overall: S::infinity() }
     }
 
-    /// Defect of residuals `(rows, n)`, where the terms of component `i` are as large as `size(i)`.
+    /// Computes the defect of residuals `(rows, n)`, where the terms of component `i` have the size `size(i)`.
     pub(super) fn of(n: usize, residual: &[S], size: impl Fn(usize) -> S) -> Self {
         let zero = <S as Real>::zero();
         let most = (0..n).map(&size).fold(zero, |most, size| S::max(most, size));
@@ -77,28 +77,28 @@ impl<S: Scalar> Defect<S> {
         defect
     }
 
-    /// Solved to the last rounding.
+    /// Returns `true` if the equation is solved to the last digit.
     pub(super) fn is_rounding(self) -> bool {
         self.relative <= S::epsilon()
     }
 
-    /// Up to the rounding errors of the model.
+    /// Returns `true` if the equation is solved up to the rounding errors of the model.
     pub(super) fn is_small(self) -> bool {
         self.overall <= S::epsilon().ldexp(MODEL_ROUNDINGS_LOG2)
     }
 
-    /// `true` if this is less than half of the best so far, in either measure. Comparing with the last one instead would
-    /// let an iteration hop between two roundings for ever.
+    /// Returns `true` if this is less than half of the best defect so far, in either measure. If it were compared with the last one, an
+    /// iteration could alternate between two rounded values forever.
     pub(super) fn improves(self, best: Self) -> bool {
         self.relative < best.relative * S::half() || self.overall < best.overall * S::half()
     }
 
-    /// The worse of both in each measure.
+    /// Returns the larger defect in each measure.
     pub(super) fn worst(self, other: Self) -> Self {
         Self { relative: S::max(self.relative, other.relative), overall: S::max(self.overall, other.overall) }
     }
 
-    /// The better of both in each measure.
+    /// Returns the smaller defect in each measure.
     pub(super) fn best(self, other: Self) -> Self {
         Self { relative: S::min(self.relative, other.relative), overall: S::min(self.overall, other.overall) }
     }
@@ -124,29 +124,29 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         }
     }
 
-    /// The next evaluations belong to a step that starts at time `t`.
+    /// Starts a step at time `t`.
     pub(super) fn begin(&mut self, t: S, piece: &Piece<S>) {
         (self.start, self.piece) = (t, Some(*piece));
     }
 
-    /// The next evaluations are of the state at time `t`, between two steps.
+    /// Sets the time `t` for evaluations between two steps.
     pub(super) fn stop_at(&mut self, t: S) {
         self.start = t;
     }
 
-    /// The next evaluations are of the state `h` later.
+    /// Moves the time forward by `h`.
     pub(super) fn move_on(&mut self, h: S) {
         self.start += h;
     }
 
-    /// Time of row `row` of a batch: it lies `after[row]` behind the start of the step, or all rows `after[0]`.
+    /// Returns the time of row `row` of a batch: `after[row]` after the start of the step, or `after[0]` for all rows.
     fn time(&self, after: &[S], row: usize) -> S {
         let after = after.get(row).or(after.first()).copied().unwrap_or_else(<S as Real>::zero);
         let t = self.start + after;
         self.piece.map_or(t, |piece| piece.time(t))
     }
 
-    /// Adds the external force to that of the model; for `after` see [`PhaseSpace::time`].
+    /// Adds the external force to the force of the model; for `after` see [`PhaseSpace::time`].
     fn add_external(&mut self, q: &[S], v: &[S], after: &[S]) -> Result<(), StepFailure> {
         let Some(force) = self.force.filter(|_| self.piece.is_some()) else { return Ok(()) };
         let (n, zero) = (self.n, <S as Real>::zero());
@@ -163,7 +163,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         Ok(())
     }
 
-    /// Evaluates states; `after` is their time since the start of the step, see [`PhaseSpace::time`].
+    /// Evaluates states; `after` is their time after the start of the step, see [`PhaseSpace::time`].
     fn evaluate(&mut self, q: &[S], v: &[S], request: Request, after: &[S]) -> Result<(), StepFailure> {
         if q.iter().chain(v).any(|x| !x.is_finite()) {
             return Err(StepFailure::State);
@@ -201,7 +201,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         Ok(())
     }
 
-    /// `p` and `g` of a batch, `(batch, n)`, row `k` lying `after[k]` behind the start of the step.
+    /// Computes `p` and `g` of a batch, `(batch, n)`, with row `k` at `after[k]` after the start of the step.
     pub(super) fn momenta_and_forces(
         &mut self,
         q: &[S],
@@ -215,15 +215,15 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         Ok(())
     }
 
-    /// `p` of one state.
+    /// Computes `p` of one state.
     pub(super) fn momentum(&mut self, q: &[S], v: &[S]) -> Result<Vec<S>, StepFailure> {
         self.evaluate(q, v, Request::MOMENTUM, &[])?;
         Ok(self.terms.momentum.clone())
     }
 
-    /// `M` as the model gives it; its derivatives along `q`, and those of `Q` along `v`, by forward differences over `sqrt(eps)`, which
-    /// suffice for an iteration matrix. The differences are one batch of `n + 1` states, or `2n + 1` with friction or an external force, at
-    /// the time `after` since the start of the step.
+    /// Computes `M` exactly, and its derivatives by `q` and those of `Q` by `v` by forward differences with the step `sqrt(eps)`, which are
+    /// sufficient for an iteration matrix. The differences need one batch of `n + 1` states, or `2n + 1` with friction or an external
+    /// force, at the time `after` after the start of the step.
     pub(super) fn derivatives(
         &mut self,
         q: &[S],
@@ -256,7 +256,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
             matrix.clear();
             matrix.resize(n * n, zero);
             for j in 0..n {
-                // The shift after rounding.
+                // The displacement after rounding.
                 let width = points[(j + 1) * n + j] - q[j];
                 for i in 0..n {
                     if outcome.is_ok() {
@@ -280,7 +280,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
         outcome
     }
 
-    /// Solves `dL/dv(q, v) = p` for `v` by Newton's method from the guess in `v`, to the last rounding.
+    /// Solves `dL/dv(q, v) = p` for `v` by Newton's method, starting from the guess in `v`, to the last digit.
     pub(super) fn velocity(&mut self, q: &[S], p: &[S], v: &mut [S]) -> Result<(), StepFailure> {
         let n = self.n;
         let mut residual = vec![<S as Real>::zero(); n];
@@ -294,7 +294,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
             }
             let found = &self.terms.momentum;
             let defect = Defect::of(n, &residual, |i| p[i].abs() + found[i].abs());
-            // Before the verdict: a momentum that does not depend on the velocity agrees with any.
+            // Solve before the test of convergence, because a momentum that does not depend on the velocity would always pass it.
             linalg::solve_symmetric(n, &self.terms.mass_matrix, &residual, &mut change, &mut self.workspace)
                 .map_err(singular)?;
             if defect.is_rounding() || (!defect.improves(best) && defect.is_small()) {
@@ -311,12 +311,13 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
 }
 
 impl<'a, S: Scalar> PhaseSpace<'a, S> {
-    /// The states that the constraints of the model allow.
+    /// Returns the manifold of states that the constraints allow.
     pub(super) fn manifold(&self) -> Option<&'a dyn Manifold<S>> {
         self.model.manifold()
     }
 
-    /// Solves `dL/dv(q, v) = p + A^T mu` and `A v = b` for `v` by Newton's method from the guess in `v`; returns the impulse `A^T mu`.
+    /// Solves `dL/dv(q, v) = p + A^T mu` and `A v = b` for `v` by Newton's method, starting from the guess in `v`; returns the impulse `A^T
+    /// mu`.
     pub(super) fn land(
         &mut self,
         manifold: &dyn Manifold<S>,
@@ -366,7 +367,7 @@ impl<'a, S: Scalar> PhaseSpace<'a, S> {
     }
 }
 
-/// A failed solve as a failure of the model.
+/// Converts a failed solution to a failure of the model.
 pub(super) fn singular(error: LinalgError) -> StepFailure {
     StepFailure::Model(match error {
         LinalgError::Singular { condition, .. } => MechanicsError::Singular { row: 0, condition },
@@ -374,20 +375,20 @@ pub(super) fn singular(error: LinalgError) -> StepFailure {
     })
 }
 
-/// A vector that is updated by small increments; the rounding error of an update is added to the next one.
+/// A vector that is updated by small increments with compensated summation.
 ///
-/// The value is `high + low` (Kahan 1965, Moller 1965): rounding errors of the updates do not accumulate, so that only the errors of the
-/// increments themselves remain in a long run, a factor `h` smaller.
+/// The value is `high + low` (Kahan 1965, Moller 1965). Rounding errors of the updates do not accumulate, so that in a long run only the
+/// errors of the increments remain, which are smaller by a factor `h`.
 #[derive(Clone, Debug)]
 pub(super) struct Compensated<S> {
     /// Rounded value.
     pub(super) high: Vec<S>,
-    /// Rests that the rounding lost.
+    /// Parts lost in rounding.
     pub(super) low: Vec<S>,
 }
 
 impl<S: Scalar> Compensated<S> {
-    /// An exact value.
+    /// Creates an exact value.
     pub(super) fn new(high: Vec<S>) -> Self {
         let low = vec![<S as Real>::zero(); high.len()];
         Self { high, low }
@@ -398,7 +399,7 @@ impl<S: Scalar> Compensated<S> {
     pub(super) fn add(&mut self, i: usize, increment: S) {
         let (high, term) = (self.high[i], self.low[i] + increment);
         let sum = high + term;
-        // Knuth's error of a sum, whichever term is larger.
+        // Knuth's error of a sum, which is valid whichever term is larger.
         let shifted = sum - high;
         self.low[i] = (high - (sum - shifted)) + (term - shifted);
         self.high[i] = sum;

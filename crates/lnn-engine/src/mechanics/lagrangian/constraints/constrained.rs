@@ -1,4 +1,4 @@
-//! A model under constraints.
+//! A model with constraints.
 
 use super::equations::evaluate;
 use super::programs::{RecordedRows, RowPrograms, Under, most_products};
@@ -15,30 +15,30 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// A unit row is redundant if its part outside the span of the rows before it is below this at every state.
+/// A normalized row is redundant if its component outside the span of the previous rows is below this at every state.
 const REDUNDANT: f64 = 1e-6;
 
-/// Why constraints leave no motion.
+/// The reason why constraints leave no motion.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConstraintError {
-    /// No state was found that satisfies all of them.
+    /// No state satisfies all constraints.
     Contradiction {
         /// The most violated constraint.
         name: String,
-        /// Its violation, in units of the coordinates; not finite if it is finite at no state.
+        /// Its violation, in units of the coordinates; not finite if the constraint is finite at no state.
         defect: f64,
     },
-    /// As many independent rows as coordinates.
+    /// There are as many independent rows as coordinates.
     TooMany {
-        /// Rows.
+        /// Number of independent rows.
         independent: usize,
-        /// Coordinates.
+        /// Number of coordinates.
         coordinates: usize,
     },
-    /// Constraints of another number of coordinates or parameters.
+    /// The constraints are for another number of coordinates or parameters.
     Shape {
-        /// What is constrained.
+        /// The quantity whose number is wrong.
         what: &'static str,
         /// Number expected.
         expected: usize,
@@ -67,10 +67,10 @@ impl core::fmt::Display for ConstraintError {
 
 impl core::error::Error for ConstraintError {}
 
-/// A model under constraints: `M a = g - c + Q + A^T lambda`, `A a = -gamma`, of any Lagrangian, written or learned.
+/// A model with constraints: `M a = g - c + Q + A^T lambda`, `A a = -gamma`, for any Lagrangian, written by hand or learned.
 ///
-/// [`Terms::multipliers`] and [`Terms::constraint_force`] state the effect of the constraints. `M` may be singular along directions that
-/// the constraints exclude. Energy, momenta and mass matrix are those of the model.
+/// [`Terms::multipliers`] and [`Terms::constraint_force`] contain the effect of the constraints. `M` may be singular in directions that the
+/// constraints exclude. Energy, momenta and mass matrix are those of the inner model.
 ///
 /// ```
 /// use lnn::lagrangian::{Constrained, Constraints, EulerLagrange, ExpressionLagrangian, Mechanics, Request, Terms};
@@ -99,23 +99,23 @@ pub struct Constrained<M, C, S> {
     model: M,
     constraints: C,
     parameters: Vec<S>,
-    /// `true` if they are shared with the model.
+    /// `true` if the constraints use the parameters of the inner model.
     shared: bool,
-    /// Rows of `constraints`, and which of them act.
+    /// Number of rows of `constraints`; `kept` lists the active ones.
     rows: usize,
     kept: Vec<usize>,
     names: Vec<String>,
     redundant: Vec<String>,
-    /// Programs of the rows that act, and of the accelerations, recorded on first use.
+    /// Programs of the active rows and of the accelerations, recorded on first use.
     programs: OnceLock<Option<Arc<RowPrograms<S>>>>,
     solved: OnceLock<Option<Solved<'static, S>>>,
 }
 
 impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
-    /// The model under all of the constraints, which have parameters of their own.
+    /// Applies all constraints to a model. The constraints have separate parameters.
     ///
     /// # Errors
-    /// [`ConstraintError::Shape`] for another number of coordinates or parameters, [`ConstraintError::TooMany`].
+    /// [`ConstraintError::Shape`] for another number of coordinates or parameters; [`ConstraintError::TooMany`] if no motion is left.
     pub fn new(model: M, constraints: C, parameters: impl IntoIterator<Item = S>) -> Result<Self, ConstraintError> {
         let (parameters, names): (Vec<S>, _) = (parameters.into_iter().collect(), constraints.names());
         let n = model.coordinates();
@@ -143,20 +143,20 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
         })
     }
 
-    /// This model with parameters shared with the inner model, in the same order.
+    /// Lets the constraints use the parameters of the inner model, in the same order.
     pub(crate) fn with_parameters_of_model(self) -> Self {
         Self { shared: true, ..self }
     }
 
-    /// This model under these rows only.
+    /// Keeps only these rows.
     pub(crate) fn only(mut self, kept: Vec<usize>) -> Self {
         self.names = kept.iter().map(|&row| self.names[row].clone()).collect();
         self.kept = kept;
         self
     }
 
-    /// This model without the constraints that depend on earlier ones at all given states, `(batch, n)` each, which are first projected
-    /// onto the constraints.
+    /// Removes the constraints that depend on earlier ones at all given states. The states, `(batch, n)` each, are first projected onto the
+    /// constraints.
     ///
     /// # Errors
     /// [`ConstraintError::Contradiction`] if no state can be projected, [`ConstraintError::TooMany`] if no motion is left.
@@ -193,7 +193,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
             for (row, name) in all.into_iter().enumerate() {
                 if needed.contains(&row) { &mut self.names } else { &mut self.redundant }.push(name);
             }
-            // Programs of other rows are of no use.
+            // Programs recorded for other rows cannot be used.
             if self.kept != needed {
                 (self.programs, self.solved) = (OnceLock::new(), OnceLock::new());
             }
@@ -256,7 +256,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
         let lift = |x: &S| HyperDual::lift(Dual::lift(*x));
         let parameters: Vec<_> = self.parameters.iter().map(lift).collect();
         let mut values = vec![lift(&zero); self.rows];
-        // The inner number carries the direction of the derivative.
+        // The inner dual number carries the direction of the derivative.
         let number = |x: &[S], i: usize, at: Option<usize>| Dual {
             value: x[i],
             tangent: if at == Some(i) { one } else { zero },
@@ -276,7 +276,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
         };
         for i in 0..2 * n {
             let (by_q, by_v) = if i < n { (Some(i), None) } else { (None, Some(i - n)) };
-            // A a + gamma: the second derivative along the motion of a function, the first of a row.
+            // A a + gamma: for a function, its second derivative along the motion; for a velocity row, its first derivative.
             let motion_q: Vec<_> = (0..n)
                 .map(|k| {
                     let speed = number(v, k, by_v);
@@ -290,7 +290,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Manifold<S> for Constrained
                 dv[i - n] += by;
                 continue;
             }
-            // A x: the first derivative along x of a function by the coordinates, of a row by the velocities.
+            // A x: for a function, its derivative by the coordinates along x; for a velocity row, that by the velocities.
             let moved_q: Vec<_> =
                 (0..n).map(|k| HyperDual::new(number(q, k, by_q), still(along.x, k), none, none)).collect();
             let moved_v: Vec<_> = (0..n).map(|k| HyperDual::new(still(v, k), none, still(along.x, k), none)).collect();
@@ -362,7 +362,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> EulerLagrange<S> for Constr
         Some(Box::new(Sum(self.model.slopes()?, Box::new(ProgramSlopes::new(programs, parameters)))))
     }
 
-    /// Always an error: across the constraints a mass matrix has no meaning.
+    /// Always fails, because the mass matrix is no metric on the constrained space.
     fn metric_jets(&self, _: &[S], _: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
         Err(MechanicsError::Derivatives { what: "mass matrix under constraints" })
     }

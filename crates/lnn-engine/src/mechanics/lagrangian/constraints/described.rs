@@ -1,4 +1,4 @@
-//! Constraints by their formulas.
+//! Constraints given as formulas.
 
 use super::Constraints;
 use crate::lagrangian::expression::{Compiler, Expression, ExpressionError, Formula, Meaning, Value};
@@ -8,7 +8,8 @@ use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// Constraints by formulas that vanish: of coordinates, or linear in velocities, such as `x_dot - R*phi_dot*cos(theta)`.
+/// Constraints given as formulas that must vanish: functions of the coordinates, or linear in the velocities, such as `x_dot -
+/// R*phi_dot*cos(theta)`.
 #[derive(Clone, Debug)]
 pub struct ExpressionConstraints {
     coordinates: usize,
@@ -24,10 +25,10 @@ struct Row {
 }
 
 impl ExpressionConstraints {
-    /// Formulas by name over coordinates, their velocities `NAME_dot`, and parameters in the order in which they will be given.
+    /// Compiles named formulas of coordinates, velocities `NAME_dot`, and parameters, which are given later in the same order.
     ///
     /// # Errors
-    /// The name of a constraint and the mistake in its formula.
+    /// The name of a constraint and the error in its formula.
     pub fn new(
         coordinates: &[&str],
         parameters: &[&str],
@@ -44,12 +45,12 @@ impl ExpressionConstraints {
         Self::compiled((coordinates.len(), parameters.len()), formulas.iter().copied(), &mut compiler, &scope)
     }
 
-    /// Value of the formula of one row, which should vanish.
+    /// Evaluates the formula of one row, which should vanish.
     pub fn value<R: Real>(&self, row: usize, parameters: &[R], q: &[R], v: &[R]) -> R {
         self.rows[row].value.evaluate(parameters, q, v)
     }
 
-    /// Sorts the rows by `place`, the position of a constraint in the file. Of dependent rows the later ones are left out.
+    /// Sorts the rows by `place`, the position of a constraint in the file. If rows are dependent, the later ones are dropped.
     #[must_use]
     pub(crate) fn in_order(&self, place: impl Fn(&str) -> usize) -> Self {
         let mut rows = self.rows.to_vec();
@@ -57,13 +58,13 @@ impl ExpressionConstraints {
         Self { rows: Arc::new(rows), ..self.clone() }
     }
 
-    /// Leaves out the constraints with these names.
+    /// Removes the constraints with these names.
     pub(super) fn without(&self, names: &[String]) -> Self {
         let rows = self.rows.iter().filter(|row| !names.contains(&row.name)).cloned().collect();
         Self { rows: Arc::new(rows), ..self.clone() }
     }
 
-    /// Formulas whose names `scope` defines.
+    /// Compiles formulas whose names are defined in `scope`.
     pub(in crate::mechanics::lagrangian) fn compiled<'a>(
         (coordinates, parameters): (usize, usize),
         formulas: impl Iterator<Item = (&'a str, &'a str)>,

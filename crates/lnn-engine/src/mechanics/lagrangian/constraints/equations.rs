@@ -1,4 +1,4 @@
-//! Constraints of a system as recorded programs, with slopes by state and parameters, for fits of its constants.
+//! Constraints of a system as recorded programs, with derivatives by state and parameters, for fitting its constants.
 
 use super::formulas::Free;
 use super::rows::{complement, independent_rows};
@@ -12,7 +12,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// The constraints that act on a system, `m` rows of `n` coordinates.
+/// The active constraints of a system, `m` rows of `n` coordinates.
 #[derive(Clone, Debug)]
 pub struct RowEquations {
     constraints: ExpressionConstraints,
@@ -20,25 +20,25 @@ pub struct RowEquations {
     chosen: Vec<usize>,
     /// Names of the rows.
     pub names: Vec<String>,
-    /// As functions of `(q, v)`: the rows `A`, `(m, n)`, and their drift `gamma`, `(m)`.
+    /// Program of `(q, v)`: the rows `A`, `(m, n)`, and their drift `gamma`, `(m)`.
     pub rows: Arc<Program<f64>>,
-    /// As functions of `(q, v, a, lambda)`: the derivatives of `-A^T lambda` and of `A a + gamma` by `q`, `v` and the chosen parameters,
-    /// row by row, `(n + m, 2n + chosen)`.
+    /// Program of `(q, v, a, lambda)`: the derivatives of `-A^T lambda` and of `A a + gamma` by `q`, `v` and the chosen parameters, row by
+    /// row, `(n + m, 2n + chosen)`.
     pub slopes: Arc<Program<f64>>,
 }
 
-/// How a state on constraints may change to first order, in rows of `2n` numbers.
+/// First-order changes of a state that satisfies the constraints, in rows of `2n` numbers.
 #[derive(Clone, Debug)]
 pub struct Tangent {
-    /// The independent changes that keep it on them: changes of positions with the velocities that they require, then changes of
-    /// velocities.
+    /// The independent changes that keep the constraints satisfied: changes of positions with the velocity changes that they require, then
+    /// changes of velocities alone.
     pub free: Vec<f64>,
-    /// Its smallest changes, positions first, after a change of each chosen parameter.
+    /// The smallest change of the state that follows a change of each chosen parameter, positions first.
     pub following: Vec<f64>,
 }
 
 impl RowEquations {
-    /// Records the rows `kept` of constraints that take all of `count` parameters.
+    /// Records the rows `kept` of the constraints, which take all `count` parameters.
     ///
     /// # Errors
     /// [`TapeError`] for formulas that branch on their data.
@@ -56,7 +56,7 @@ impl RowEquations {
         })?;
         let rate = Rate::of_constraints(constraints, (all.len(), kept), &vec![0.0; count], true)?;
         let slopes = Program::record_within(ROWS, (3 * n + m, count), |x, p| {
-            // Slopes of `A^T lambda` and of `-(A a + gamma)`.
+            // Derivatives of `A^T lambda` and of `-(A a + gamma)`.
             let found = rate.slopes(x, p, chosen)?;
             let columns = 2 * n + chosen.len();
             let element = |at: usize| found[at / columns].get(&(at % columns)).map_or_else(Tracer::zero, |x| -*x);
@@ -72,17 +72,17 @@ impl RowEquations {
         })
     }
 
-    /// Number of rows that are functions of the coordinates alone.
+    /// Returns the number of holonomic rows.
     pub fn holonomic(&self) -> usize {
         self.kept.iter().filter(|&&row| self.constraints.is_holonomic(row)).count()
     }
 
-    /// Number of independent changes of a state that keep it on the constraints.
+    /// Returns the number of independent changes of a state that keep the constraints satisfied.
     pub fn freedom(&self) -> usize {
         2 * self.constraints.coordinates() - self.holonomic() - self.kept.len()
     }
 
-    /// The states that the rows allow for these values of the parameters.
+    /// Returns the manifold of allowed states for these values of the parameters.
     ///
     /// # Errors
     /// [`ConstraintError::Shape`] for another number of parameters.
@@ -92,8 +92,8 @@ impl RowEquations {
         Ok(all.only(self.kept.clone()))
     }
 
-    /// Derivatives of the constraint functions and of the rates of all rows by each chosen parameter: two numbers for each row, `(m, 2)`
-    /// for each parameter.
+    /// Returns the derivatives of the constraint functions and of the rates of all rows by each chosen parameter: two numbers for each row,
+    /// `(m, 2)` for each parameter.
     pub fn by_parameters(&self, values: &[f64], (q, v): (&[f64], &[f64])) -> Vec<f64> {
         let lift = |x: &f64| HyperDual::lift(*x);
         let moving: Vec<_> = q.iter().zip(v).map(|(&q, &v)| HyperDual::new(q, v, 0.0, 0.0)).collect();
@@ -112,7 +112,7 @@ impl RowEquations {
         by
     }
 
-    /// How a state `(q, v)` on the constraints may change.
+    /// Returns the tangent space of the constraints at the state `(q, v)`.
     pub fn tangent(&self, manifold: &dyn Manifold<f64>, values: &[f64], start: &[f64]) -> Tangent {
         let n = self.constraints.coordinates();
         let (q, v) = start.split_at(n);
@@ -123,7 +123,7 @@ impl RowEquations {
         let functions: Vec<usize> = (0..self.kept.len()).filter(of_functions).collect();
         let gradients: Vec<f64> =
             functions.iter().flat_map(|row| &rows.matrix[row * n..(row + 1) * n]).copied().collect();
-        // The smallest change of velocities required by a change of positions.
+        // Returns the smallest change of velocities that a change of positions requires.
         let with_velocities = |dq: &[f64], own: &[f64]| -> Vec<f64> {
             let asked = rates.chunks_exact(n).zip(own).map(|(row, own)| own + super::dot(row, dq));
             let dv = along_rows(n, &rows.matrix, &asked.collect::<Vec<_>>()).0;
@@ -152,7 +152,7 @@ impl RowEquations {
     }
 }
 
-/// Rows of constraints at one state; only those in `kept`.
+/// Evaluates the constraint rows in `kept` at one state.
 pub(super) fn evaluate<R: Real>(
     constraints: &impl Constraints,
     (all, kept): (usize, &[usize]),
@@ -167,7 +167,7 @@ pub(super) fn evaluate<R: Real>(
     let lift = |x: &[R]| x.iter().map(|&x| Dual::lift(x)).collect::<Vec<_>>();
     let (of_rows, mut state) = (lift(parameters), [lift(q), lift(v)]);
     let mut values = vec![Dual::lift(zero); all];
-    // A function of coordinates has its gradient by the coordinates, a row linear in the velocities its gradient by the velocities.
+    // The gradient of a function is taken by the coordinates, that of a row linear in the velocities by the velocities.
     for (by, kind) in [(0, true), (1, false)] {
         if !holonomic.contains(&kind) {
             continue;
@@ -181,7 +181,7 @@ pub(super) fn evaluate<R: Real>(
             }
         }
     }
-    // Along the motion: value, rate and second derivative of a function; value and rate of a row.
+    // Derivatives along the motion: value, rate and second derivative of a function; value and rate of a velocity row.
     let parameters: Vec<HyperDual<R>> = parameters.iter().map(|&x| HyperDual::lift(x)).collect();
     let q: Vec<HyperDual<R>> = q.iter().zip(v).map(|(&q, &v)| HyperDual::new(q, v, v, zero)).collect();
     let v: Vec<HyperDual<R>> = v.iter().map(|&v| HyperDual::lift(v)).collect();

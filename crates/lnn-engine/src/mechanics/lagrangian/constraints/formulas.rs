@@ -1,4 +1,4 @@
-//! Constraints by name and formula, as a fit finds or reads them and a model file keeps them.
+//! Constraints by name and formula, as a fit finds or reads them and a model file stores them.
 
 use super::{Constrained, ConstraintError, ExpressionConstraints, Manifold};
 use crate::lagrangian::expression::{is_name, is_reserved};
@@ -9,34 +9,34 @@ use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-/// Most constraints.
+/// Largest number of constraints.
 const MOST: usize = 256;
 
-/// Constraints by formulas over the coordinates of a model and their velocities, without parameters.
+/// Constraints as formulas of the coordinates and velocities of a model, without parameters.
 #[derive(Clone, Debug)]
 pub struct FormulaConstraints {
     formulas: BTreeMap<String, String>,
     compiled: ExpressionConstraints,
 }
 
-/// Why formulas do not constrain a model.
+/// The reason why formulas cannot constrain a model.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum ConstraintFormulaError {
-    /// No formula, or more than are taken.
+    /// There is no formula, or there are too many.
     Number(usize),
-    /// The name of a constraint that no message can show.
+    /// The name of a constraint cannot be printed in a message.
     Name,
-    /// A coordinate that no formula can name.
+    /// The name of a coordinate cannot be used in a formula.
     Coordinate(String),
-    /// A mistake in a formula.
+    /// A formula contains an error.
     Formula {
         /// Name of the constraint.
         name: String,
-        /// The mistake.
+        /// The error.
         error: ExpressionError,
     },
-    /// Constraints that contradict each other, or leave no motion.
+    /// The constraints contradict each other or leave no motion.
     Constraints(ConstraintError),
 }
 
@@ -70,7 +70,7 @@ impl From<ConstraintError> for ConstraintFormulaError {
     }
 }
 
-/// A point in space without a Lagrangian, used as the model of constraints before there is one.
+/// A free point in space, used as the model of constraints before there is a Lagrangian.
 pub(super) struct Free(pub usize);
 
 impl Lagrangian for Free {
@@ -83,7 +83,7 @@ impl Lagrangian for Free {
 }
 
 impl FormulaConstraints {
-    /// Formulas that vanish, by the name of their constraint, over coordinates `NAME` and velocities `NAME_dot`.
+    /// Compiles the formulas that must vanish, by the name of their constraint, in terms of coordinates `NAME` and velocities `NAME_dot`.
     ///
     /// # Errors
     /// [`ConstraintFormulaError`].
@@ -117,20 +117,20 @@ impl FormulaConstraints {
         Self { compiled: self.compiled.in_order(place), ..self }
     }
 
-    /// The formulas by name.
+    /// Returns the formulas by name.
     pub fn formulas(&self) -> &BTreeMap<String, String> {
         &self.formulas
     }
 
-    /// The formulas as functions of states.
+    /// Returns the formulas as functions of the state.
     pub(crate) fn compiled(&self) -> &ExpressionConstraints {
         &self.compiled
     }
 
-    /// A model under these constraints.
+    /// Applies these constraints to a model.
     ///
     /// # Errors
-    /// [`ConstraintError::Shape`] for a model of other coordinates.
+    /// [`ConstraintError::Shape`] if the model has other coordinates.
     pub fn constrain<'a, S: Scalar>(
         &self,
         model: Box<dyn EulerLagrange<S> + 'a>,
@@ -138,18 +138,18 @@ impl FormulaConstraints {
         Ok(Box::new(Constrained::new(model, self.compiled.clone(), [])?))
     }
 
-    /// The states that they allow.
+    /// Returns the manifold of allowed states.
     ///
     /// # Errors
-    /// Never, because the coordinates match.
+    /// None, because the coordinates match.
     pub fn manifold<S: Scalar>(&self) -> Result<impl Manifold<S> + use<S>, ConstraintError> {
         self.alone()
     }
 
-    /// The constraints that are independent at some of these states, `(batch, n)` each, and the names of the others.
+    /// Returns the constraints that are independent at some of these states, `(batch, n)` each, and the names of the redundant ones.
     ///
     /// # Errors
-    /// [`ConstraintFormulaError::Constraints`] for constraints that contradict each other or leave no motion.
+    /// [`ConstraintFormulaError::Constraints`] if the constraints contradict each other or leave no motion.
     pub fn independent(mut self, q: &[f64], v: &[f64]) -> Result<(Self, Vec<String>), ConstraintFormulaError> {
         let kept = self.alone()?.independent(q, v)?;
         let redundant = kept.redundant().to_vec();

@@ -1,4 +1,4 @@
-//! The motion of a batch: `M a = f`, under constraints `M a = f + A^T lambda` and `A a = -gamma`.
+//! Solves the equations of motion of a batch: `M a = f`, or with constraints `M a = f + A^T lambda` and `A a = -gamma`.
 
 use super::rows::independent_rows;
 use crate::lagrangian::MechanicsError;
@@ -6,10 +6,10 @@ use crate::linalg::{self, Failure, Workspace};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// The matrices of a batch of motions.
+/// The matrices in the equations of motion of a batch.
 #[derive(Clone, Copy)]
 pub struct Motion<'a, S> {
-    /// Number of coordinates, and of constraints.
+    /// Numbers of coordinates and constraints.
     pub size: (usize, usize),
     /// `M`, `(batch, n, n)`.
     pub mass: &'a [S],
@@ -19,8 +19,8 @@ pub struct Motion<'a, S> {
     pub drift: &'a [S],
 }
 
-/// Solves for accelerations, `(batch, n)`, and multipliers, `(batch, m)`, under forces `(batch, n)`; rows that fail are added to
-/// `failures` and have `NaN`.
+/// Solves for accelerations, `(batch, n)`, and multipliers, `(batch, m)`, under forces `(batch, n)`. Rows that fail become `NaN` and are
+/// added to `failures`.
 pub fn accelerate<S: Scalar>(
     motion: Motion<'_, S>,
     force: &[S],
@@ -38,7 +38,7 @@ pub fn accelerate<S: Scalar>(
     }
 }
 
-/// The matrices `[M A^T; A 0]` of a batch and their solver; the buffers are reused.
+/// The matrices `[M A^T; A 0]` of a batch and their solver, with reusable buffers.
 #[derive(Clone, Debug)]
 pub struct Bordered<S> {
     size: (usize, usize),
@@ -54,7 +54,7 @@ impl<S> Default for Bordered<S> {
 }
 
 impl<S: Scalar> Bordered<S> {
-    /// Takes `M`, `(batch, n, n)`, and the rows `A`, `(batch, m, n)`.
+    /// Sets `M`, `(batch, n, n)`, and the rows `A`, `(batch, m, n)`.
     pub fn set(&mut self, (n, m): (usize, usize), mass: &[S], rows: &[S]) {
         let (k, zero) = (n + m, <S as Real>::zero());
         self.size = (n, m);
@@ -73,13 +73,13 @@ impl<S: Scalar> Bordered<S> {
         }
     }
 
-    /// The matrices, `(batch, n + m, n + m)`.
+    /// Returns the matrices, `(batch, n + m, n + m)`.
     pub fn matrices(&self) -> &[S] {
         &self.matrices
     }
 
-    /// Solves for `[x; y]` with `[upper; lower]` on the right, `(batch, n)` and `(batch, m)`, 0 if `lower` is empty; `true` if no row
-    /// failed. Failed rows are `NaN`, and the workspace lists them.
+    /// Solves for `[x; y]` with the right side `[upper; lower]`, `(batch, n)` and `(batch, m)`; an empty `lower` counts as 0. Returns
+    /// `true` if no row failed; failed rows are `NaN`, and the workspace lists them.
     pub fn solve(&mut self, upper: &[S], lower: &[S], x: &mut [S], y: &mut [S], workspace: &mut Workspace<S>) -> bool {
         let (n, m) = self.size;
         let (k, zero) = (n + m, <S as Real>::zero());
@@ -101,7 +101,7 @@ impl<S: Scalar> Bordered<S> {
     }
 }
 
-/// With multipliers.
+/// Solves with constraints and multipliers.
 fn constrained<S: Scalar>(
     motion: Motion<'_, S>,
     force: &[S],
@@ -121,8 +121,8 @@ fn constrained<S: Scalar>(
     multipliers.iter_mut().for_each(|multiplier| *multiplier = -*multiplier);
 }
 
-/// Why a state under constraints cannot move: a constraint that depends on others there, or a mass matrix that is singular within
-/// them.
+/// Explains why the solution failed at a state: either a constraint depends on others there, or the mass matrix is singular within the
+/// constraints.
 #[cold]
 fn explained<S: Scalar>((n, m): (usize, usize), constraints: &[S], row: usize, failure: Failure) -> MechanicsError {
     if matches!(failure, Failure::Singular { .. }) {
@@ -134,7 +134,7 @@ fn explained<S: Scalar>((n, m): (usize, usize), constraints: &[S], row: usize, f
     MechanicsError::unsolved(row, failure)
 }
 
-/// One coordinate: `a = f / M`.
+/// Solves for one coordinate: `a = f / M`.
 fn divide<S: Scalar>(mass: &[S], force: &[S], acceleration: &mut [S], failures: &mut Vec<MechanicsError>) {
     for (row, ((a, &f), &m)) in acceleration.iter_mut().zip(force).zip(mass).enumerate() {
         *a = f / m;

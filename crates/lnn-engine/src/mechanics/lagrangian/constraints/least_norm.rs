@@ -1,4 +1,4 @@
-//! Motion that a degenerate Lagrangian leaves open, chosen to be the shortest.
+//! Accelerations of least norm where a degenerate Lagrangian does not determine the motion.
 
 use super::rows::dot;
 use super::{ReducedMass, along_rows};
@@ -7,31 +7,31 @@ use crate::linalg::{Workspace, minimum_norm};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// A model whose accelerations of least norm are taken where its mass matrix is singular within its constraints: along the null
-/// directions nothing is determined, and they are 0 there.
+/// Wraps a model whose mass matrix may be singular within its constraints, and chooses accelerations of least norm: they are 0 in the null
+/// directions, which the equations do not determine.
 ///
-/// A state whose equations contradict each other, a force along a null direction, still fails.
+/// States with contradictory equations, that is, with a force in a null direction, still fail.
 #[derive(Clone, Debug)]
 pub struct LeastNorm<M>(
-    /// The model.
+    /// The wrapped model.
     pub M,
 );
 
-/// The choice at one state.
+/// The chosen motion at one state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeastNormMotion<S> {
     /// `a`, `(n)`.
     pub acceleration: Vec<S>,
     /// Multipliers of the constraints, `(m)`.
     pub multipliers: Vec<S>,
-    /// Dimension of the directions along which it was chosen.
+    /// Number of undetermined directions.
     pub open: usize,
-    /// Size of the force along them, which nothing can balance: 0, up to rounding, if there is a motion.
+    /// Magnitude of the unbalanced force in these directions: 0, up to rounding, if a motion exists.
     pub unbalanced: S,
 }
 
 impl<S: Scalar> LeastNormMotion<S> {
-    /// The shortest `a` with `A a = -gamma` that satisfies `M a = f` within the constraints.
+    /// Computes the shortest `a` with `A a = -gamma` that satisfies `M a = f` within the constraints.
     fn of(n: usize, mass: &[S], rows: &[S], drift: &[S], force: &[S]) -> Option<Self> {
         let reduced = ReducedMass::of(n, mass, rows).ok()?;
         let mut a: Vec<S> = along_rows(n, rows, drift).0.into_iter().map(|x| -x).collect();

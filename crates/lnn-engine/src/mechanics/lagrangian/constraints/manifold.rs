@@ -1,4 +1,4 @@
-//! The states that constraints allow.
+//! The manifold of states that satisfy the constraints.
 
 use super::programs::RowPrograms;
 use crate::scalar::Scalar;
@@ -19,8 +19,8 @@ pub struct ManifoldRows<S> {
 }
 
 impl ManifoldRows<f64> {
-    /// Distance of the state from constraint `c`: `phi` over the length of its gradient, or `A v - b` over the length of its row; and that
-    /// length.
+    /// Returns the distance of the state from constraint `c` and the length of its gradient or row. The distance is `phi` divided by the
+    /// length of its gradient, or `A v - b` divided by the length of its row.
     pub fn distance(&self, manifold: &(impl Manifold<f64> + ?Sized), c: usize) -> (f64, f64) {
         let n = manifold.coordinates();
         let length = self.matrix[c * n..(c + 1) * n]
@@ -31,24 +31,24 @@ impl ManifoldRows<f64> {
     }
 }
 
-/// The states that the constraints of a model allow: `phi(q) = 0` and `A v = b`.
+/// The states that satisfy the constraints of a model: `phi(q) = 0` and `A v = b`.
 pub trait Manifold<S: Scalar>: Send + Sync {
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;
 
-    /// Names of the `m` constraints that act.
+    /// Returns the names of the `m` active constraints.
     fn names(&self) -> &[String];
 
-    /// Names of redundant constraints, which were left out.
+    /// Returns the names of redundant constraints, which are not among the rows.
     fn redundant(&self) -> &[String];
 
-    /// `true` if a row is a function `phi(q)` of the coordinates alone.
+    /// Returns `true` if a row is a function `phi(q)` of the coordinates alone.
     fn is_holonomic(&self, row: usize) -> bool;
 
     /// Evaluates the rows at one state; the buffers are reused.
     fn rows(&self, q: &[S], v: &[S], rows: &mut ManifoldRows<S>);
 
-    /// Programs of the rows with their pattern, recorded on first use; `None` if they cannot be recorded.
+    /// Returns the sparse programs of the rows, recorded on first use; `None` if they cannot be recorded.
     #[doc(hidden)]
     fn programs(&self) -> Option<&RowPrograms<S>> {
         None
@@ -57,12 +57,12 @@ pub trait Manifold<S: Scalar>: Send + Sync {
     /// Writes the derivatives of the rates by the coordinates, `d(A v - b)/dq`, `(m, n)`.
     fn rate_gradients(&self, q: &[S], v: &[S], gradients: &mut Vec<S>);
 
-    /// Adds the derivatives by `q` and `v` of `load.(A x) - pull.(A a + gamma)`, `x`, `a`, `(n)`, and `load`, `pull`, `(m)`, held: the
-    /// effect of a change of the rows on a function of the accelerations.
+    /// Adds the derivatives by `q` and `v` of `load.(A x) - pull.(A a + gamma)` at fixed `x`, `a`, `(n)`, and `load`, `pull`, `(m)`. This
+    /// propagates the effect of a change of the rows to a function of the accelerations.
     fn pull_back(&self, state: (&[S], &[S]), along: RowAdjoint<'_, S>, derivatives: (&mut [S], &mut [S]));
 }
 
-/// Result of [`Manifold::pull_back`].
+/// Arguments of [`Manifold::pull_back`].
 #[derive(Clone, Copy, Debug)]
 pub struct RowAdjoint<'a, S> {
     /// The direction `x`, `(n)`.

@@ -8,8 +8,8 @@
 //! [ A   0  ] [ -lambda ] = [  -gamma   ]
 //! ```
 //!
-//! which has one solution where the rows of `A` are independent and no direction `z` that they allow has `M z = 0` within them: `M` itself
-//! may be singular. `A^T lambda` is the force of constraint, such as the tension of a rod.
+//! The solution is unique where the rows of `A` are independent and no allowed direction `z` has `M z = 0` within the constraints; `M`
+//! itself may be singular. `A^T lambda` is the force of constraint, such as the tension of a rod.
 
 mod constrained;
 mod described;
@@ -44,22 +44,22 @@ use crate::scalar::Real;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Constraints written once over [`Real`], as a [`Lagrangian`](super::Lagrangian) is: derivatives follow.
+/// Constraints written once over [`Real`], like a [`Lagrangian`](super::Lagrangian); their derivatives are computed.
 pub trait Constraints: Send + Sync {
     /// Number of coordinates `n`.
     fn coordinates(&self) -> usize;
 
-    /// Names of the rows, for messages; one for each constraint.
+    /// Returns the names of the rows for messages, one for each constraint.
     fn names(&self) -> Vec<String>;
 
-    /// `true` if a row is a function `phi(q)` of the coordinates alone, `false` if it is `A(q) v - b(q)`.
+    /// Returns `true` if a row is a function `phi(q)` of the coordinates alone, `false` if it is `A(q) v - b(q)`.
     fn is_holonomic(&self, row: usize) -> bool;
 
-    /// Number of parameters that [`Constraints::values`] takes.
+    /// Returns the number of parameters that [`Constraints::values`] takes.
     fn parameter_count(&self) -> Option<usize> {
         None
     }
 
-    /// Writes the vanishing quantities, one number per row: `phi(q)`, or `A(q) v - b(q)`, linear in `v`.
+    /// Writes one number per row, which must vanish: `phi(q)`, or `A(q) v - b(q)`, linear in `v`.
     fn values<R: Real>(&self, parameters: &[R], q: &[R], v: &[R], values: &mut [R]);
 }

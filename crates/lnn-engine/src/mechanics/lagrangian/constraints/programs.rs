@@ -1,4 +1,4 @@
-//! Programs of constraints: their rows by the pattern, the smallest changes that project a state onto them, and a test of independence.
+//! Programs of constraints: sparse rows, the smallest corrections that project a state onto them, and a test of independence.
 
 use super::Constraints;
 use crate::forward::Dual;
@@ -12,10 +12,10 @@ use alloc::collections::BTreeMap;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// An elimination is recorded with up to this many products per element of the full matrix; with more, a dense solver is faster.
+/// Largest number of products per element of the full matrix in a recorded elimination; beyond it, a dense solver is faster.
 const PRODUCTS: usize = 8;
 
-/// Largest number of products in an elimination of `rows` rows.
+/// Returns the largest number of products in an elimination of `rows` rows.
 pub(super) fn most_products(rows: usize) -> usize {
     PRODUCTS * rows * rows
 }
@@ -28,7 +28,7 @@ pub(super) struct RecordedRows<S> {
     along: Program<S>,
 }
 
-/// Constraints at a state that is being recorded.
+/// Constraint rows at a traced state.
 struct Rows<R> {
     matrix: Lists<R>,
     values: Vec<R>,
@@ -36,14 +36,14 @@ struct Rows<R> {
 }
 
 impl<S: Scalar> RecordedRows<S> {
-    /// The rows of the constraints with these indices; `None` if they are too large, or branch on their data.
+    /// Records the constraint rows with these indices; returns `None` if they are too large or branch on their data.
     pub fn record(
         constraints: &impl Constraints,
         (all, kept): (usize, &[usize]),
         parameters: &[S],
     ) -> Option<Arc<Self>> {
         let n = constraints.coordinates();
-        // Along the motion: value and rate of a function; the value of a row is its rate.
+        // Derivatives along the motion: value and rate of a function; the value of a velocity row already is its rate.
         let along = Program::record_within(ROWS, (2 * n, 0), |x, _| {
             let zero = Tracer::zero();
             let p: Vec<_> = parameters.iter().map(|&p| Dual::lift(Tracer::constant(p))).collect();
@@ -70,7 +70,7 @@ impl<S: Scalar> RecordedRows<S> {
     }
 }
 
-/// The equations of motion of a model under constraints.
+/// The equations of motion of a model with constraints.
 #[derive(Debug)]
 pub(super) struct Under<S> {
     /// The equations of the model without constraints.
@@ -82,7 +82,7 @@ impl<S: Scalar> RecordMotion<S> for Under<S> {
     fn record<'t>(&self, state: &[Tracer<'t, S>], parameters: &[Tracer<'t, S>]) -> Option<Balance<Tracer<'t, S>>> {
         let mut balance = self.beneath.record(state, parameters)?;
         let n = balance.coordinates;
-        // Constraints are known of one model only.
+        // Only one of the nested models may contribute constraints.
         if balance.lower.len() > n {
             return None;
         }
@@ -113,7 +113,7 @@ impl<S: Scalar> RecordMotion<S> for Under<S> {
     }
 }
 
-/// The lower triangle of `A A^T`; `None` if it needs too many products.
+/// Computes the lower triangle of `A A^T`; returns `None` if it needs too many products.
 fn gram<R: Real>(matrix: &[Vec<(usize, R)>], most: usize) -> Option<Lists<R>> {
     let mut columns: BTreeMap<usize, Vec<(usize, R)>> = BTreeMap::new();
     for (c, row) in matrix.iter().enumerate() {
@@ -145,7 +145,7 @@ pub struct RowPrograms<S> {
     shifted: OnceLock<Option<Arc<Program<S>>>>,
 }
 
-/// A program of the elements of `A` that are not zero, row by row, and where the rows begin and the last one ends.
+/// A program of the nonzero elements of `A`, row by row, and the offset of each row, with the total number last.
 type Elements<S> = (Arc<Program<S>>, Vec<usize>);
 
 impl<S: Scalar> RowPrograms<S> {
@@ -158,8 +158,8 @@ impl<S: Scalar> RowPrograms<S> {
         &self.rows
     }
 
-    /// The shortest `x` with `A x = d`, of the defects `d` of the functions of coordinates alone, or of the rates of all rows: a program of `x`,
-    /// pairs of an element of the diagonal of `A A^T` and its pivot, `d`, and this diagonal.
+    /// Returns the program of the shortest `x` with `A x = d`, where `d` are the defects of the holonomic rows, or the rates of all rows.
+    /// Its outputs are `x`, pairs of a diagonal element of `A A^T` and its pivot, `d`, and this diagonal.
     pub(super) fn correction(&self, of_rates: bool) -> Option<Replay<S>> {
         let (n, _) = self.rows.rate.size;
         let record = || {
@@ -186,7 +186,7 @@ impl<S: Scalar> RowPrograms<S> {
         self.corrections[usize::from(of_rates)].get_or_init(record).clone().map(Replay::new)
     }
 
-    /// The elements of the rows that are not zero, and where each row begins among them.
+    /// Returns the program of the nonzero elements of the rows, and the offset of each row among them.
     pub(crate) fn elements(&self) -> Option<(Replay<S>, &[usize])> {
         let (n, _) = self.rows.rate.size;
         let record = || {
@@ -205,8 +205,8 @@ impl<S: Scalar> RowPrograms<S> {
         Some((Replay::new(Arc::clone(program)), starts))
     }
 
-    /// The pivots of `U A A^T U - x`, for a diagonal matrix `U` and a number `x` that follow the state: all are positive if no eigenvalue
-    /// of `U A A^T U` is below `x`.
+    /// Returns the program of the pivots of `U A A^T U - x`, whose inputs after the state are a diagonal matrix `U` and a number `x`. All
+    /// pivots are positive if no eigenvalue of `U A A^T U` is below `x`.
     pub(crate) fn shifted(&self) -> Option<Replay<S>> {
         let (n, m) = self.rows.rate.size;
         let record = || {

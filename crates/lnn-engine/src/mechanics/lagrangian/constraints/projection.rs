@@ -8,25 +8,25 @@ use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
 use alloc::vec::Vec;
 
-/// Steps of Newton's method.
+/// Largest number of Newton steps.
 const MAX_STEPS: usize = 60;
-/// Defects below this many roundings of the state count as zero.
+/// Defects below this multiple of the rounding error of the state count as zero.
 const ROUNDINGS: f64 = 1024.0;
 
-/// A state that could not be projected onto the constraints.
+/// The error for a state that could not be projected onto the constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OffManifold {
     /// The most violated row.
     pub row: usize,
-    /// Its violation over the length of its gradient: a distance in units of the coordinates, or of the velocities.
+    /// Its violation divided by the length of its gradient: a distance in units of the coordinates, or of the velocities.
     pub defect: f64,
 }
 
-/// Projects a state onto the constraints by the smallest changes, along the rows, and returns the distances of coordinates and velocities:
-/// `q` to `phi(q) = 0` by Newton's method, then `v` to `A v = b`.
+/// Projects a state onto the constraints with the smallest changes along the rows: `q` to `phi(q) = 0` by Newton's method, then `v` to `A v
+/// = b`. Returns how far coordinates and velocities moved.
 ///
 /// # Errors
-/// [`OffManifold`] if no state was found; `q` and `v` are then the nearest.
+/// [`OffManifold`] if the iteration does not converge; `q` and `v` then are its best state.
 pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) -> Result<[f64; 2], OffManifold> {
     let mut values = Defects::new(manifold, false);
     let before = [q.to_vec(), v.to_vec()];
@@ -39,7 +39,7 @@ pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) 
         let size = largest(change);
         q.iter_mut().zip(change).for_each(|(q, &change)| *q -= change);
         let rounding = S::epsilon() * largest(q);
-        // The step has reached rounding, or no longer improves.
+        // The step is at the level of rounding, or no longer decreases.
         if size <= rounding || (step > 3 && size > last * S::half() && size < rounding.ldexp(10)) {
             break;
         }
@@ -59,13 +59,13 @@ pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) 
     Ok([moved(&before[0], q), moved(&before[1], v)])
 }
 
-/// Defects of a state in some rows: the values of functions of the coordinates, or the rates of all rows.
+/// Defects of a state in some rows: the values of holonomic constraints, or the rates of all rows.
 struct Defects<'a, S: Scalar> {
     manifold: &'a dyn Manifold<S>,
     of_rates: bool,
-    /// The rows.
+    /// Indices of the rows.
     of: Vec<usize>,
-    /// The program of the correction, if there is one, and its results: the change, pairs of a diagonal element of `A A^T` and its pivot,
+    /// The program of the correction, if there is one. Its results are the change, pairs of a diagonal element of `A A^T` and its pivot,
     /// the defects, and this diagonal.
     program: Option<Replay<S>>,
     change: Vec<S>,
@@ -86,7 +86,7 @@ impl<'a, S: Scalar> Defects<'a, S> {
         Self { manifold, of_rates, of, program, change, guards, defects, squares, rows: ManifoldRows::default() }
     }
 
-    /// Evaluates the program; `false` if there is none.
+    /// Runs the program; returns `false` if there is none.
     fn replay(&mut self, q: &[S], v: &[S]) -> bool {
         let outputs = &mut [&mut self.change[..], &mut self.guards, &mut self.defects, &mut self.squares];
         self.program.as_mut().is_some_and(|program| program.evaluate(1, &[q, v], &[], outputs).is_ok())
@@ -100,8 +100,8 @@ impl<'a, S: Scalar> Defects<'a, S> {
         self.defects.extend(self.of.iter().map(|&row| all[row]));
     }
 
-    /// The smallest change of the coordinates or velocities, to be subtracted, that removes the defects to first order. Possibly dependent
-    /// rows are left to a solver that handles them.
+    /// Returns the smallest change of the coordinates or velocities, to be subtracted, that removes the defects to first order. Rows that
+    /// may be dependent are passed to a solver that can handle them.
     fn least_change(&mut self, q: &[S], v: &[S]) -> &[S] {
         if !(self.replay(q, v) && are_safe(&self.guards) && are_finite(&self.change)) {
             self.evaluate(q, v);
@@ -110,7 +110,7 @@ impl<'a, S: Scalar> Defects<'a, S> {
         &self.change
     }
 
-    /// Refuses defects at a state of this size that are more than rounding.
+    /// Rejects defects that exceed the rounding error at a state of this size.
     fn check(&mut self, q: &[S], v: &[S], size: S) -> Result<(), OffManifold> {
         if self.of.is_empty() {
             return Ok(());
@@ -145,7 +145,7 @@ impl<'a, S: Scalar> Defects<'a, S> {
     }
 }
 
-/// Projects an acceleration at a state on the constraints onto `A a = -gamma`.
+/// Projects an acceleration onto `A a = -gamma` at a state that satisfies the constraints.
 pub fn project_acceleration<S: Scalar>(manifold: &dyn Manifold<S>, q: &[S], v: &[S], a: &mut [S]) {
     let mut rows = ManifoldRows::default();
     manifold.rows(q, v, &mut rows);
@@ -156,14 +156,14 @@ pub fn project_acceleration<S: Scalar>(manifold: &dyn Manifold<S>, q: &[S], v: &
     a.iter_mut().zip(&change).for_each(|(a, &change)| *a -= change);
 }
 
-/// The smallest `x` with `A x = defects` for some of the rows; the best approximation if they depend on each other.
+/// Computes the smallest `x` with `A x = defects` for some of the rows; a least-squares solution if they are dependent.
 fn least_change<S: Scalar>(n: usize, rows: &ManifoldRows<S>, of: &[usize], defects: &[S]) -> Vec<S> {
     let picked: Vec<S> = of.iter().flat_map(|&row| rows.matrix[row * n..(row + 1) * n].iter().copied()).collect();
     along_rows(n, &picked, defects).0
 }
 
-/// The smallest `x = A^T w` with `A x = right`, and the smallest `w`, for rows `A`, `(m, n)`; the best approximation if the rows depend on
-/// each other. Zero rows impose nothing.
+/// Computes the smallest `x = A^T w` with `A x = right`, and the smallest `w`, for rows `A`, `(m, n)`; a least-squares solution if the rows
+/// are dependent. Zero rows have no effect.
 pub fn along_rows<S: Scalar>(n: usize, rows: &[S], right: &[S]) -> (Vec<S>, Vec<S>) {
     let (m, zero) = (right.len(), <S as Real>::zero());
     let sizes: Vec<S> = rows.chunks_exact(n).map(length).collect();

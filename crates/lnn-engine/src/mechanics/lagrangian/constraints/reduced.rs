@@ -5,8 +5,8 @@ use crate::linalg::{LinalgError, Workspace, eigh};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// `Z^T M Z` at one state, where `Z` is an orthonormal basis of the directions that the constraints allow: the part of `M` that motion
-/// determines.
+/// `Z^T M Z` at one state, where `Z` is an orthonormal basis of the directions that the constraints allow: the part of `M` that the motion
+/// can determine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReducedMass<S> {
     /// `Z`, rows `(d, n)`.
@@ -15,12 +15,12 @@ pub struct ReducedMass<S> {
     pub matrix: Vec<S>,
     /// Its eigenvalues, ascending, `(d)`.
     pub eigenvalues: Vec<S>,
-    /// Directions of velocities, `(d, n)`, of these eigenvalues.
+    /// The velocity direction of each eigenvalue, `(d, n)`.
     pub directions: Vec<S>,
 }
 
 impl<S: Scalar> ReducedMass<S> {
-    /// Reduces a mass matrix `(n, n)` by the rows `A`, `(m, n)`, of constraints; without rows, it is the mass matrix itself.
+    /// Reduces a mass matrix `(n, n)` by the constraint rows `A`, `(m, n)`; without rows the result is the mass matrix.
     ///
     /// # Errors
     /// [`LinalgError::NotFinite`].
@@ -46,9 +46,9 @@ impl<S: Scalar> ReducedMass<S> {
         Ok(Self { basis, matrix, eigenvalues, directions })
     }
 
-    /// Null directions `z` with `M z = 0` within the constraints: the Lagrangian is degenerate along them.
+    /// Returns the null directions `z` with `M z = 0` within the constraints, in which the Lagrangian is degenerate.
     ///
-    /// An eigenvalue below `roundings` roundings of the largest counts as zero.
+    /// An eigenvalue below `roundings` times the rounding error of the largest one counts as zero.
     pub fn null_directions(&self, roundings: f64) -> Vec<&[S]> {
         let d = self.eigenvalues.len();
         let n = self.directions.len() / d.max(1);

@@ -3,10 +3,10 @@
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
 
-/// Unit rows depend on others if their part outside the span of those is below this many roots of the rounding.
+/// A normalized row depends on others if its component outside their span is below this multiple of the square root of the machine epsilon.
 const RANK: f64 = 16.0;
 
-/// Removes the part of `x` along orthonormal rows, `(k, n)`, twice, since once leaves rounding.
+/// Subtracts the projection of `x` onto orthonormal rows, `(k, n)`; twice, because one pass leaves rounding errors.
 pub fn take_out<S: Scalar>(x: &mut [S], basis: &[S]) {
     for _ in 0..2 {
         for u in basis.chunks_exact(x.len()) {
@@ -16,12 +16,12 @@ pub fn take_out<S: Scalar>(x: &mut [S], basis: &[S]) {
     }
 }
 
-/// Scalar product.
+/// Computes the scalar product.
 pub fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
     a.iter().zip(b).fold(<S as Real>::zero(), |sum, (&a, &b)| a.mul_add(b, sum))
 }
 
-/// Euclidean length, of numbers of any size.
+/// Computes the Euclidean length without overflow or underflow.
 pub(in crate::mechanics::lagrangian) fn length<S: Scalar>(x: &[S]) -> S {
     let size = largest(x);
     if size > <S as Real>::zero() && size.is_finite() {
@@ -33,13 +33,13 @@ pub(in crate::mechanics::lagrangian) fn length<S: Scalar>(x: &[S]) -> S {
     }
 }
 
-/// Largest magnitude; `NaN` if there is a `NaN`.
+/// Returns the largest magnitude; `NaN` if any number is `NaN`.
 pub(super) fn largest<S: Scalar>(x: &[S]) -> S {
     x.iter().fold(<S as Real>::zero(), |most, x| Real::max(most, x.abs()))
 }
 
-/// Unit rows of an `(m, n)` matrix with a part of more than `tolerance` outside the span of the kept rows before them: their indices, and
-/// an orthonormal basis of their span.
+/// Selects rows of an `(m, n)` matrix that, after normalization, have a component above `tolerance` outside the span of the rows kept
+/// before. Returns their indices and an orthonormal basis of their span.
 pub(super) fn independent<S: Scalar>(n: usize, matrix: &[S], tolerance: f64) -> (Vec<usize>, Vec<S>) {
     let (mut kept, mut basis) = (Vec::new(), Vec::new());
     for (i, row) in matrix.chunks_exact(n).enumerate() {
@@ -58,16 +58,16 @@ pub(super) fn independent<S: Scalar>(n: usize, matrix: &[S], tolerance: f64) -> 
     (kept, basis)
 }
 
-/// `independent` up to rounding.
+/// Selects independent rows up to rounding.
 pub fn independent_rows<S: Scalar>(n: usize, matrix: &[S]) -> (Vec<usize>, Vec<S>) {
     independent(n, matrix, RANK * S::epsilon().to_f64().sqrt())
 }
 
-/// An orthonormal basis, `(n - k, n)`, of the complement of orthonormal rows, `(k, n)`.
+/// Returns an orthonormal basis, `(n - k, n)`, of the orthogonal complement of orthonormal rows, `(k, n)`.
 pub(in crate::mechanics::lagrangian) fn complement<S: Scalar>(n: usize, rows: &[S]) -> Vec<S> {
     let mut all = rows.to_vec();
     while all.len() < n * n {
-        // The axis with the largest part outside the present span.
+        // Choose the axis with the largest component outside the current span.
         let outside = |i: usize| {
             let mut axis = vec![<S as Real>::zero(); n];
             axis[i] = <S as Real>::one();

@@ -9,19 +9,19 @@ type Model = Box<dyn EulerLagrange<f64>>;
 
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
-/// States that no constraint has brought into order.
+/// States that do not satisfy any constraints.
 fn states(count: usize) -> (Vec<f64>, Vec<f64>) {
     let number = |k: usize, by: f64| (by * k as f64 + 0.3).sin();
     ((0..count).map(|k| number(k, 0.37)).collect(), (0..count).map(|k| 2.0 * number(k, 0.71)).collect())
 }
 
-/// Coordinates `x`, `y`, `z` and a Lagrangian in which two of them attract each other.
+/// A model with coordinates `x`, `y`, `z` in which two of them attract each other.
 fn free() -> Mechanics<ExpressionLagrangian, f64> {
     let lagrangian = "m*(x_dot^2 + y_dot^2 + z_dot^2)/2 + x_dot*y_dot*cos(z)/2 - g*z";
     Mechanics::new(ExpressionLagrangian::new(&NAMES, &["m", "g"], lagrangian).unwrap(), [2.0, 9.8])
 }
 
-/// It under constraints of their own parameter `c = 0.7`.
+/// The same model with constraints, which have a separate parameter `c = 0.7`.
 fn constrained(
     formulas: &[(&str, &str)],
 ) -> Constrained<Mechanics<ExpressionLagrangian, f64>, ExpressionConstraints, f64> {
@@ -43,7 +43,7 @@ fn check(name: &str, model: &dyn EulerLagrange<f64>, (q, v): (&[f64], &[f64])) {
 fn accelerations_under_constraints_are_those_of_the_terms() {
     for (n, batch) in [(1, 3), (2, 70), (7, 9), (40, 2)] {
         let name = format!("cartesian-chain-{n}");
-        // Rods of other lengths than theirs pull as well.
+        // Rods that are stretched pull as well.
         let (q, v) = states(2 * n * batch);
         check(&name, &*build(&name, &[]).unwrap(), (&q, &v));
     }
@@ -52,7 +52,7 @@ fn accelerations_under_constraints_are_those_of_the_terms() {
         let model: Model = build(name, &[]).unwrap();
         let (mut q, v) = states(3 * model.coordinates());
         if model.coordinates() == 9 {
-            // Nearly a rotation.
+            // Close to a rotation matrix.
             q.iter_mut().enumerate().for_each(|(k, q)| *q = 0.1 * *q + if k % 9 % 4 == 0 { 1.0 } else { 0.0 });
         }
         check(name, &*model, (&q, &v));
@@ -82,13 +82,13 @@ fn dependent_rows_and_singular_masses_are_left_to_the_terms() {
         assert!(!accelerations.is_solved(&q, &v, &mut a));
         let found = accelerations.at(&q, &v, &mut a);
         assert_eq!(format!("{found:?}"), format!("{expected:?}"));
-        // Another state of the same model, and of the same buffers.
+        // Reuses the buffers for another state of the same model.
         accelerations.at(&[0.4, 0.3, 0.5], &v, &mut a).unwrap();
         check("another", &model, (&[0.4, 0.3, 0.5], &v));
     }
     let nearly = constrained(&[("one", "x + y"), ("other", "x + 1.001*y")]);
     assert!(!Accelerations::new(&nearly).is_solved(&[0.0; 3], &[0.0; 3], &mut [0.0; 3]));
-    // No mass matrix in the time of a clock.
+    // With the coordinate time as parameter there is no mass matrix.
     let clock: Model = build("schwarzschild-by-clock", &[]).unwrap();
     let (q, v, mut a) = ([0.0, 8.0, 1.3, 0.4], [1.0, 0.05, 0.01, 0.04], [0.0; 4]);
     Accelerations::new(&*clock).at(&q, &v, &mut a).unwrap();
@@ -107,7 +107,7 @@ fn models_around_constraints_and_beneath_them_keep_their_answers() {
     Accelerations::new(&around).at(&q, &v, &mut a[0]).unwrap();
     Accelerations::new(&within).at(&q, &v, &mut a[1]).unwrap();
     assert!(around.solved().is_none() && within.solved().is_none() && a[0] == a[1]);
-    // Constraints on a constrained model are refused as always.
+    // A second layer of constraints is rejected as always.
     let alone = Constrained::new(free(), surface(), []).unwrap();
     let twice = Constrained::new(&alone as &dyn EulerLagrange<f64>, surface(), []).unwrap();
     assert!(matches!(Accelerations::new(&twice).at(&q, &v, &mut a[0]), Err(MechanicsError::Shape { .. })));
@@ -122,7 +122,7 @@ fn models_around_constraints_and_beneath_them_keep_their_answers() {
 fn programs_are_those_of_the_rows_that_act() {
     let repeated = constrained(&[("one", "x^2 + y^2 - c"), ("same", "2*c - 2*x^2 - 2*y^2"), ("two", "z_dot - x_dot")]);
     let (q, v) = ([0.8, 0.2, 0.1, 0.3, 0.9, -0.4], [0.5, 0.1, 0.2, 0.3, 0.4, 0.1]);
-    // Whatever was recorded of all of them.
+    // This holds whichever programs were recorded.
     assert!(repeated.solved().is_some());
     let kept = repeated.independent(&q, &v).unwrap();
     assert_eq!((kept.names().len(), kept.redundant().len()), (2, 1));
@@ -190,7 +190,7 @@ fn states_are_brought_to_the_constraints_as_without_programs() {
     let (q, v) = ([0.6, 0.5, 0.4], [0.3, 0.2, -0.1]);
     for formulas in [
         &[("drive", "z_dot - c*x_dot*y - x*z"), ("surface", "x^2*y + c*exp(z) - 2")][..],
-        // One of them twice, two that contradict each other, one that vanishes.
+        // The first two are equivalent, the next two contradict each other, and the last one vanishes identically.
         &[("one", "x^2 + y^2 - c"), ("same", "2*x^2 + 2*y^2 - 2*c"), ("blade", "z_dot - x_dot")],
         &[("one", "x^2 + y^2 - c"), ("other", "x^2 + y^2 - 2*c")],
         &[("one", "z - c"), ("none", "(x - 0.6)^2 + (y - 0.5)^2")],

@@ -1,4 +1,4 @@
-//! Events of a description: formulas whose zeros a roll-out finds.
+//! Events of a description: a roll-out finds the zeros of their formulas.
 
 use super::quantity::Decimal;
 use super::{Description, DescriptionError};
@@ -10,22 +10,22 @@ use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// An event: where a formula vanishes along a motion, and what happens there.
+/// An event: the formula whose zeros a roll-out finds, and what happens there.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct EventDescription {
-    /// Formula of coordinates, velocities, the time `t`, parameters and definitions; its zero is the event.
+    /// Formula of coordinates, velocities, the time `t`, parameters and definitions; its zeros are the events.
     when: String,
-    /// Only where it falls through 0.
+    /// `true` to accept only zeros where the formula decreases.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "super::is_false"))]
     falling: bool,
-    /// Only where it rises through 0.
+    /// `true` to accept only zeros where the formula increases.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "super::is_false"))]
     rising: bool,
-    /// The motion ends when this event has happened this many times.
+    /// Number of occurrences after which the motion ends.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     after: Option<usize>,
-    /// What happens.
+    /// What happens at the event.
     #[cfg_attr(feature = "serde", serde(default))]
     then: Consequence,
 }
@@ -34,20 +34,20 @@ pub struct EventDescription {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize), serde(untagged))]
 pub enum Consequence {
-    /// A setting given by a word.
+    /// A consequence given by a word.
     Named(Word),
-    /// An impact on the surface where the formula vanishes.
+    /// An impact on the surface where the formula is zero.
     Impact {
-        /// The speed after over the speed before, along the normal: a number or a formula.
+        /// Ratio of the normal speeds after and before the impact: a number or a formula.
         restitution: Decimal,
     },
 }
 
-/// The effect of an event without an impact.
+/// A consequence other than an impact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "lowercase"))]
 pub enum Word {
-    /// It is recorded.
+    /// The event is recorded.
     Mark,
     /// The motion ends.
     Stop,
@@ -60,7 +60,7 @@ impl Default for Consequence {
 }
 
 impl Description {
-    /// The events.
+    /// Compiles the events.
     pub(super) fn compiled_events(
         &self,
         compiler: &mut Compiler,
@@ -104,8 +104,8 @@ impl Description {
         Ok(events)
     }
 
-    /// Rejects a coefficient of restitution that is out of range for the default parameters; one that depends on the state is not known
-    /// here.
+    /// Rejects a coefficient of restitution that is out of range for the default parameters. One that depends on the state cannot be
+    /// checked here.
     fn check_restitution(&self, formula: &Formula) -> Result<(), String> {
         let value = |text: &str| text.trim().parse().unwrap_or(f64::NAN);
         let defaults: Vec<f64> = self.parameters.values().map(|parameter| value(&parameter.default.0)).collect();

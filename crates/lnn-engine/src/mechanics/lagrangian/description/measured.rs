@@ -1,4 +1,4 @@
-//! Measured quantities of a description: formulas of the readings of sensors.
+//! Measured quantities of a description: formulas of sensor readings.
 
 use super::{CoordinateDescription, Description, DescriptionError};
 use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value};
@@ -9,30 +9,31 @@ use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::Serialize;
 
-/// Columns of roll-outs other than those of states.
+/// Columns of roll-outs that are not part of a state.
 const TAKEN: [&str; 3] = ["t", "tau", "energy"];
 
-/// A measured quantity: a formula, or a table with more about it.
+/// A measured quantity: a formula, or a table with further keys.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize))]
 pub struct MeasuredDescription {
-    /// What is read: of coordinates, velocities, accelerations `NAME_ddot`, the time `t`, inputs, parameters and definitions.
+    /// Formula of the reading in terms of coordinates, velocities, accelerations `NAME_ddot`, the time `t`, inputs, parameters and
+    /// definitions.
     pub(super) formula: String,
     /// Unit of the readings.
     pub(super) unit: String,
-    /// Column of the readings; that of the quantity's name if left out.
+    /// Column of the readings; by default the name of the quantity.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub(super) column: Option<String>,
-    /// Column of their standard deviations; these are estimated if left out.
+    /// Column of their standard deviations; if it is missing, they are estimated.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub(super) error: Option<String>,
-    /// An angle in radians: readings that differ by full turns are the same.
+    /// `true` for an angle in radians: readings that differ by full turns are equal.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "super::is_false"))]
     pub(super) periodic: bool,
 }
 
 impl Description {
-    /// The measured quantities.
+    /// Compiles the measured quantities.
     pub(super) fn compiled_readings(
         &self,
         compiler: &mut Compiler,
@@ -71,7 +72,7 @@ impl Description {
         Ok(readings)
     }
 
-    /// The names in formulas, including inputs and accelerations; accelerations come after the inputs.
+    /// Extends the names by inputs, then accelerations.
     fn with_accelerations(
         &self,
         scope: &BTreeMap<String, Meaning>,
@@ -87,7 +88,7 @@ impl Description {
         Ok(scope)
     }
 
-    /// Either all readings have columns of standard deviations, or none has.
+    /// Checks that either all readings or none have a column of standard deviations.
     fn check_errors(&self) -> Result<(), DescriptionError> {
         let without = self.measured.iter().find(|(_, own)| own.error.is_none());
         match without.filter(|_| self.measured.values().any(|own| own.error.is_some())) {
@@ -99,7 +100,7 @@ impl Description {
         }
     }
 
-    /// Names and columns: short, on one line, and different from columns of states with other contents.
+    /// Checks names and columns: they must be short, on one line, and different from columns of states with other contents.
     fn check_reading(&self, name: &str, own: &MeasuredDescription) -> Result<(), DescriptionError> {
         let short =
             |text: &str| !text.trim().is_empty() && text.chars().count() <= 100 && !text.chars().any(char::is_control);

@@ -1,7 +1,7 @@
-//! User-defined systems: the contents of a system file, and the [`System`](super::system::System) made from it.
+//! User-defined systems: the contents of a system file, and the [`System`](super::system::System) built from it.
 //!
-//! The structures are those of a TOML file (`docs/system-files.md`), of the table `[description]` of a configuration and of
-//! the header of a model file.
+//! The structures match those of a TOML file (`docs/system-files.md`), of the table `[description]` of a configuration and of the header of
+//! a model file.
 
 mod chain;
 mod events;
@@ -40,97 +40,98 @@ use quantity::{Decimal, Quantity};
 use serde::{Deserialize, Serialize};
 pub use system::is_free_name;
 
-/// A system: coordinates, parameters, and a Lagrangian or a metric as formulas.
+/// A system: coordinates, parameters, and a Lagrangian or a metric given as formulas.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Description {
-    /// Name: letters, digits, `-` and `_`; none of the catalogue's.
+    /// Name: letters, digits, `-` and `_`; must differ from all names in the catalogue.
     pub name: String,
-    /// Name in titles; the name if left out.
+    /// Name in titles; by default the name.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub title: Option<String>,
-    /// Unit of the evolution parameter; if left out `s`, and none for a system with a time among its coordinates.
+    /// Unit of the evolution parameter; by default `s`, or none for a system with a time-like coordinate.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub time_unit: Option<String>,
-    /// `L` of coordinates, velocities `NAME_dot`, parameters and definitions; either this or a metric.
+    /// `L` in terms of coordinates, velocities `NAME_dot`, parameters and definitions; an alternative to a metric.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub lagrangian: Option<String>,
-    /// Rayleigh's dissipation function `D` of the same names, whose force is `-dD/dv`; none if left out.
+    /// Rayleigh's dissipation function `D` in terms of the same names, with the force `-dD/dv`; optional.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<String>,
-    /// Generalized forces in addition to those of `L` and `D`, by the coordinates that they act on: formulas of the same names, of the time
-    /// `t` and of inputs.
+    /// Generalized forces in addition to those of `L` and `D`, by the coordinates on which they act: formulas of the same names, the time
+    /// `t` and inputs.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub forces: BTreeMap<String, String>,
-    /// Measured quantities in the forces, such as the voltage of a motor, and their units.
+    /// Measured quantities on which the forces depend, such as the voltage of a motor, and their units.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub inputs: BTreeMap<String, String>,
-    /// Inputs that do not change along a motion, so that all formulas may depend on them.
+    /// Inputs that are constant along a motion, so that all formulas may depend on them.
     #[cfg_attr(feature = "serde", serde(skip))]
     marks: BTreeSet<String>,
-    /// Zeros of formulas that a roll-out finds, by name: of the same names and of the time `t`.
+    /// Events by name: a roll-out finds the zeros of these formulas of the same names and the time `t`.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     events: BTreeMap<String, EventDescription>,
-    /// What sensors read, by name: formulas of the same names, of accelerations, of the time `t` and of inputs.
+    /// Sensor readings by name: formulas of the same names, accelerations, the time `t` and inputs.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     measured: BTreeMap<String, MeasuredDescription>,
-    /// Coordinates, in order; `q1`, `q2`, .. of a chain of links if left out.
+    /// Coordinates, in order; for a chain of links by default `q1`, `q2`, and so on.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub(crate) coordinates: Vec<CoordinateDescription>,
-    /// Settings that all links share.
+    /// Settings shared by all links.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     chain: Option<ChainDescription>,
-    /// Links of a chain from its base on, each with the joint that moves it, one per coordinate; a Lagrangian and a dissipation function are
-    /// added to theirs.
+    /// Links of a chain, starting at its base, each with the joint that moves it, one per coordinate. A Lagrangian and a dissipation
+    /// function are added to those of the links.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     links: Vec<LinkDescription>,
     /// Constants by name.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     #[doc(hidden)]
     pub parameters: BTreeMap<String, ParameterDescription>,
-    /// Names for formulas; they may use each other in any order.
+    /// Abbreviations for formulas; they may use each other in any order.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub definitions: BTreeMap<String, String>,
-    /// Formulas that vanish, by the names of the constraints: of coordinates, or linear in velocities.
+    /// Formulas that must vanish, by the names of the constraints: functions of coordinates, or linear in velocities.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub constraints: BTreeMap<String, String>,
-    /// Lines of the file with constraints of these names, if known.
+    /// Lines of the constraints in the file, if known.
     #[cfg_attr(feature = "serde", serde(skip))]
     #[doc(hidden)]
     pub constraint_lines: ConstraintLines,
-    /// Components of `g` in `L = g_ij q_i_dot q_j_dot / 2` by pairs of coordinates, `"t,r"`; symmetric, those left out are 0.
+    /// Components of `g` in `L = g_ij q_i_dot q_j_dot / 2` by pairs of coordinates, `"t,r"`; the metric is symmetric, and missing
+    /// components are 0.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub metric: Option<BTreeMap<String, String>>,
-    /// Bounds of training states by the names of their columns; the coordinates' own where left out.
+    /// Bounds of training states by column name; by default those of the coordinates.
     #[cfg_attr(
         feature = "serde",
         serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
     )]
     pub training: BTreeMap<String, [Quantity; 2]>,
-    /// Bounds of the states on which errors are stated.
+    /// Bounds of the states at which errors are reported.
     #[cfg_attr(
         feature = "serde",
         serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
     )]
     pub validation: BTreeMap<String, [Quantity; 2]>,
-    /// Motions on which a model is tried.
+    /// Trajectories on which a model is tested.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "TrajectoryDescription::is_empty"))]
     pub(crate) trajectory: TrajectoryDescription,
-    /// Shell in which training states lie, of the metric of a field around a centre; those of the bounds if left out.
+    /// Spherical shell for the training states, used for metrics of a field around a centre; by default the states fill the bounds.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub(crate) shell: Option<ShellDescription>,
 }
 
-/// Shell around a centre.
+/// Spherical shell around a centre.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct ShellDescription {
     /// Names of the Cartesian coordinates around the centre.
     pub(crate) coordinates: Vec<String>,
-    /// Lowest and highest distance from it.
+    /// Smallest and largest distance from the centre.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "pair::one"))]
     pub radius: [Quantity; 2],
-    /// Largest rapidity in a local frame; 1 if left out.
+    /// Largest rapidity in a local frame; by default 1.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub rapidity: Option<Quantity>,
 }
@@ -139,25 +140,25 @@ pub struct ShellDescription {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct CoordinateDescription {
-    /// Name, also of its column; the velocity's is the name and `_dot`.
+    /// Name, also of its column; the velocity's name adds `_dot`.
     pub name: String,
     /// Unit.
     #[cfg_attr(feature = "serde", serde(default = "one"))]
     pub unit: String,
-    /// An angle in radians: adding `2 pi` changes nothing.
+    /// `true` for an angle in radians, for which values that differ by `2 pi` are equal.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     pub periodic: bool,
-    /// The coordinate that is a time, in a spacetime.
+    /// `true` for the time-like coordinate of a spacetime.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     pub time_like: bool,
-    /// Lowest and highest value of interest; one turn for a periodic coordinate if left out.
+    /// Smallest and largest value of interest; by default one turn for a periodic coordinate.
     #[cfg_attr(
         feature = "serde",
         serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")
     )]
     pub bounds: Option<[Quantity; 2]>,
-    /// Lowest and highest velocity of interest; without them the velocity of the time-like coordinate of a metric follows from
-    /// `g(v, v) = -1`.
+    /// Smallest and largest velocity of interest; without them the velocity of the time-like coordinate of a metric follows from `g(v, v) =
+    /// -1`.
     #[cfg_attr(
         feature = "serde",
         serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "pair::optional")
@@ -165,38 +166,38 @@ pub struct CoordinateDescription {
     pub velocity_bounds: Option<[Quantity; 2]>,
 }
 
-/// A constant: a number, or a table with more about it.
+/// A constant: a number, or a table with further keys.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize))]
 pub struct ParameterDescription {
-    /// Value unless another one is given.
+    /// Default value.
     pub default: Decimal,
     /// Unit.
     pub unit: String,
     /// Allowed values.
     pub range: Range,
-    /// `true` if its value is to be found by the training.
+    /// `true` if training determines its value.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "is_false"))]
     pub learn: bool,
-    /// What has a value of its own; nothing for one value.
+    /// Set if the parameter has a separate value for each trajectory.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub per: Option<Per>,
-    /// Values that are known, by the names of the trajectories.
+    /// Known values, by the names of the trajectories.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "BTreeMap::is_empty"))]
     pub known: BTreeMap<String, Decimal>,
 }
 
-/// Motions on which a model is tried.
+/// Trajectories on which a model is tested.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct TrajectoryDescription {
-    /// End of the time span that starts at 0; 10 if left out.
+    /// End of the time span, which starts at 0; by default 10.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub t_end: Option<Quantity>,
-    /// Step of the output; a hundredth of the span if left out.
+    /// Output step; by default a hundredth of the span.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dt: Option<Quantity>,
-    /// Bounds of the starts by columns; the middle half of the validation bounds where left out.
+    /// Bounds of the initial states by column; by default the middle half of the validation bounds.
     #[cfg_attr(
         feature = "serde",
         serde(default, skip_serializing_if = "BTreeMap::is_empty", deserialize_with = "pair::by_name")
@@ -211,7 +212,7 @@ impl TrajectoryDescription {
 }
 
 impl Description {
-    /// This description with other values of parameters, by name.
+    /// Returns this description with other values of parameters, by name.
     fn with_defaults(&self, values: &[(&str, f64)]) -> Self {
         let mut changed = self.clone();
         for (name, value) in values {
@@ -222,8 +223,8 @@ impl Description {
         changed
     }
 
-    /// A system of a Lagrangian and constraints; coordinates with units, bounds and those of their velocities, parameters with
-    /// defaults, units and ranges.
+    /// Assembles a system from a Lagrangian and constraints; coordinates have units, bounds and velocity bounds, parameters have defaults,
+    /// units and ranges.
     pub(super) fn of_parts<'a>(
         (name, title, time_unit): (&str, &str, &str),
         lagrangian: String,
@@ -274,12 +275,12 @@ impl Description {
     }
 }
 
-/// Mistake in a description.
+/// An error in a description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DescriptionError {
     /// Path of the key, such as `metric.t,t`.
     pub key: String,
-    /// The mistake, with the column for a formula.
+    /// The error, with its column if it is in a formula.
     pub problem: String,
 }
 
@@ -301,7 +302,7 @@ impl DescriptionError {
     }
 }
 
-/// Lines of constraints in a file by their names. They do not affect whether descriptions are equal.
+/// Line numbers of constraints in a file by their names. They are ignored when descriptions are compared.
 #[derive(Clone, Debug, Default)]
 pub struct ConstraintLines(pub BTreeMap<String, usize>);
 
@@ -314,40 +315,40 @@ impl PartialEq for ConstraintLines {
 /// A description with its compiled Lagrangian.
 #[derive(Clone, Debug)]
 pub struct Described {
-    /// The description, links written out.
+    /// The description with its links expanded.
     pub description: Description,
-    /// The description with its links, if it has any.
+    /// The description before expansion, if it has links.
     written: Option<Description>,
-    /// Its Lagrangian; parameters in the order of their names. If it or the forces depend on the time, this is a coordinate after the
-    /// others, and inputs are coordinates after the time.
+    /// Its Lagrangian, whose parameters are sorted by name. If the Lagrangian or the forces depend on the time, the time is a coordinate
+    /// after the others, and inputs are coordinates after the time.
     pub lagrangian: ExpressionLagrangian,
-    /// Its dissipation function, if it has one; parameters as the Lagrangian's.
+    /// Its dissipation function, if it has one, with the parameters of the Lagrangian.
     pub dissipation: Option<ExpressionLagrangian>,
-    /// Its forces, if there are any; parameters as the Lagrangian's.
+    /// Its forces, if it has any, with the parameters of the Lagrangian.
     pub(super) forces: Option<FormulaForces>,
-    /// Its events; parameters as the Lagrangian's.
+    /// Its events, with the parameters of the Lagrangian.
     pub(super) events: Arc<[FormulaEvent]>,
-    /// Its measured quantities; parameters as the Lagrangian's.
+    /// Its measured quantities, with the parameters of the Lagrangian.
     pub(super) readings: Arc<[FormulaReading]>,
-    /// Its constraints, if there are any; parameters as the Lagrangian's.
+    /// Its constraints, if it has any, with the parameters of the Lagrangian.
     pub constraints: Option<ExpressionConstraints>,
-    /// `true` if these are known to be independent: nothing has to be examined.
+    /// `true` if the constraints are known to be independent, so that no check is needed.
     pub independent: bool,
-    /// The links, if it has nothing else.
+    /// The chain of links, if the description contains nothing else.
     pub(super) chain: Option<Arc<Shape>>,
     /// The velocity of the time-like coordinate on the mass shell.
     shell: Option<Formula>,
-    /// Where training states lie, if not within their bounds.
+    /// Region of the training states, if they do not fill their bounds.
     pub around_centre: Option<ShellAdvice>,
 }
 
 impl Described {
-    /// `true` if the Lagrangian or forces depend on the time, or on inputs.
+    /// Returns `true` if the Lagrangian or forces depend on the time or on inputs.
     pub fn is_timed(&self) -> bool {
         Lagrangian::coordinates(&self.lagrangian) > self.description.coordinates.len()
     }
 
-    /// `true` if it was written as a chain of links.
+    /// Returns `true` if the description was written as a chain of links.
     pub fn is_chain(&self) -> bool {
         self.written.is_some()
     }
@@ -357,13 +358,13 @@ impl Described {
         self.written.as_ref().map_or(0, |written| written.links.len())
     }
 
-    /// Its links as one can show them.
+    /// Returns its links for display.
     pub(crate) fn shown_links(&self) -> Vec<ShownLink<'_>> {
         let names: Vec<&str> = self.description.coordinates.iter().map(|c| c.name.as_str()).collect();
         self.written.as_ref().map_or_else(Vec::new, |written| written.shown_links(&names))
     }
 
-    /// The original description, with other values of parameters, by name.
+    /// Returns the original description with other values of parameters, by name.
     pub fn with_defaults(&self, values: &[(&str, f64)]) -> Description {
         let plain = self.description.with_defaults(values);
         match &self.written {
@@ -372,8 +373,8 @@ impl Described {
         }
     }
 
-    /// The velocity of the time-like coordinate that puts a state on the mass shell `g(v, v) = -1`, pointing to the future;
-    /// what `v` holds in its place is not read. `None` for a system without mass shell.
+    /// Returns the velocity of the time-like coordinate that puts a state on the mass shell `g(v, v) = -1`, pointing to the future; its
+    /// element of `v` is ignored. Returns `None` for a system without mass shell.
     pub fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
         self.shell.as_ref().map(|shell| shell.evaluate(parameters, q, v))
     }

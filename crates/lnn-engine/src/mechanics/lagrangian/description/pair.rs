@@ -1,4 +1,4 @@
-//! Pairs of numbers in a file: a list of exactly two. serde itself ignores additional elements of a list of fixed length.
+//! Pairs of numbers in a file: a list of exactly two. For a list of fixed length, serde ignores additional elements.
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;
@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error};
 
-/// A list of two.
+/// A list of exactly two elements.
 struct Pair<T>([T; 2]);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for Pair<T> {
@@ -17,22 +17,22 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Pair<T> {
     }
 }
 
-/// A pair.
+/// Reads a pair.
 pub(crate) fn one<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<[T; 2], D::Error> {
     Pair::deserialize(deserializer).map(|Pair(pair)| pair)
 }
 
-/// A pair that may be left out.
+/// Reads an optional pair.
 pub fn optional<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[T; 2]>, D::Error> {
     Ok(Option::<Pair<T>>::deserialize(deserializer)?.map(|Pair(pair)| pair))
 }
 
-/// A list of pairs.
+/// Reads a list of pairs.
 pub fn list<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[T; 2]>, D::Error> {
     Ok(Vec::<Pair<T>>::deserialize(deserializer)?.into_iter().map(|Pair(pair)| pair).collect())
 }
 
-/// Pairs by name.
+/// Reads pairs by name.
 pub(crate) fn by_name<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<BTreeMap<String, [T; 2]>, D::Error> {

@@ -1,7 +1,7 @@
 //! Parameters with a value for each trajectory, such as a payload that differs between logs.
 //!
-//! A parameter `p` becomes the definition `p = p_a*[a] + p_b*[b] + ..` of one parameter for each trajectory and of marks that are 1 on one
-//! trajectory and 0 on all others. Marks are inputs that the Lagrangian may depend on, since they do not change along a motion.
+//! A parameter `p` is replaced by the definition `p = p_a*[a] + p_b*[b] + ..`, with one parameter for each trajectory and a mark that is 1
+//! on this trajectory and 0 on all others. Marks are inputs on which the Lagrangian may depend, since they are constant along a motion.
 
 use super::{Decimal, Description, DescriptionError, ParameterDescription};
 use alloc::collections::{BTreeMap, BTreeSet};
@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// What has a value of a parameter of its own.
+/// The scope in which a parameter has a separate value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Per {
@@ -19,26 +19,26 @@ pub enum Per {
     Trajectory,
 }
 
-/// A description for trajectories of some names.
+/// A description for given trajectories.
 pub struct PerTrajectory {
-    /// The description, with parameters `p_NAME` in place of `p`, and one input for each trajectory that marks it.
+    /// The description, with parameters `p_NAME` in place of `p`, and one input per trajectory that marks it.
     pub description: Description,
-    /// These inputs, trajectory by trajectory.
+    /// The marks, trajectory by trajectory.
     pub marks: Vec<String>,
-    /// The parameters in place of `p` whose values are not known.
+    /// For each `p`, the new parameters whose values are unknown.
     pub unknown: BTreeMap<String, Vec<String>>,
 }
 
 impl Description {
-    /// `true` if a parameter has a value for each trajectory.
+    /// Returns `true` if a parameter has a separate value for each trajectory.
     pub fn is_per_trajectory(&self) -> bool {
         self.parameters.values().any(|parameter| parameter.per.is_some())
     }
 
-    /// The description for trajectories of these names, its links written out. Values that are known are not learned.
+    /// Returns the description for trajectories with these names, with its links expanded. Known values are not learned.
     ///
     /// # Errors
-    /// A known value of a trajectory that does not exist; a name that is taken.
+    /// A known value belongs to a trajectory that does not exist, or a name is already used.
     #[doc(hidden)]
     pub fn per_trajectory(&self, names: &[String]) -> Result<PerTrajectory, DescriptionError> {
         let mut all = self.unfolded()?;
@@ -90,7 +90,7 @@ impl Description {
         self.marks.len()
     }
 
-    /// Sets another value for trajectories whose parameter is not known, as in a system with values of its parameters.
+    /// Sets the value for trajectories whose parameter is unknown, as in a system with values of its parameters.
     pub fn with_default(&mut self, symbol: &str, value: f64) {
         if let Some(own) = self.parameters.get_mut(symbol) {
             own.default = Decimal(value.to_string());
@@ -98,7 +98,7 @@ impl Description {
     }
 }
 
-/// Names of trajectories as parts of the names of parameters: letters, digits and `_`, each once.
+/// Converts names of trajectories to unique parts of parameter names: letters, digits and `_`.
 fn labels(names: &[String]) -> Vec<String> {
     let plain =
         |name: &String| name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect::<String>();

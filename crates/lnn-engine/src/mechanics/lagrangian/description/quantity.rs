@@ -1,4 +1,4 @@
-//! Numbers of a description: written as numbers, or as text.
+//! Numbers of a description, written as numbers or as text.
 
 use alloc::string::String;
 
@@ -10,7 +10,7 @@ use serde::Serialize;
 #[cfg_attr(feature = "serde", derive(Serialize), serde(transparent))]
 pub struct Quantity(pub f64);
 
-/// A parameter's value as decimal text, written as a number or as text; every digit counts where the precision has it.
+/// A parameter's value as decimal text, written as a number or as text; all digits are used if the precision allows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize), serde(transparent))]
 pub struct Decimal(pub String);

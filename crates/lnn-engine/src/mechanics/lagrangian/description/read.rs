@@ -1,4 +1,4 @@
-//! Numbers of a description as a file has them.
+//! Reads the numbers of a description from a file.
 
 use super::events::{Consequence, Word};
 use super::measured::MeasuredDescription;
@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde::de::value::{MapAccessDeserializer, StrDeserializer};
 use serde::de::{Deserializer, Error, MapAccess, Visitor};
 
-/// A number or a text, as text.
+/// Reads a number or a text as text.
 struct Written(&'static str);
 
 impl Visitor<'_> for Written {
@@ -23,7 +23,7 @@ impl Visitor<'_> for Written {
         f.write_str(self.0)
     }
     fn visit_f64<E: Error>(self, value: f64) -> Result<String, E> {
-        // Text that reads back to the same number, without an exponent's sign that the grammar lacks.
+        // This text parses to the same number; the grammar has no sign `+` in an exponent.
         Ok(value.to_string())
     }
     fn visit_i64<E: Error>(self, value: i64) -> Result<String, E> {
@@ -50,7 +50,7 @@ impl<'de> Deserialize<'de> for Decimal {
     }
 }
 
-/// The name or the number of a link, as text.
+/// Reads the name or the number of a link as text.
 pub(super) fn reference<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
     deserializer.deserialize_any(Written("the name or the number of a link")).map(Some)
 }

@@ -1,4 +1,4 @@
-//! From a description to a system: every name and formula checked, the Lagrangian compiled.
+//! Converts a description to a system: checks every name and formula, and compiles the Lagrangian.
 
 use super::{Described, Description, DescriptionError, Quantity};
 use crate::lagrangian::constraints::ExpressionConstraints;
@@ -18,12 +18,12 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::f64::consts::PI;
 
-/// Most coordinates of a system in a file.
+/// Largest number of coordinates of a system in a file.
 const MAX_COORDINATES: usize = 64;
-/// Most parameters, most definitions, and most constraints.
+/// Largest number of parameters, of definitions, and of constraints.
 const MAX_NAMES: usize = 256;
 
-/// Constants of a link and its joint.
+/// Number of constants of a link and its joint.
 const CONSTANTS: usize = 13;
 
 /// Name of the time in formulas.
@@ -31,10 +31,10 @@ const TIME: &str = "t";
 
 type Outcome<T> = Result<T, DescriptionError>;
 
-/// Demand of the mass shell, in words.
+/// The condition of the mass shell in words.
 const SHELL: &str = "from the mass shell g(v, v) = -1, to the future";
 
-/// Rejects names that formulas cannot use.
+/// Rejects names that cannot be used in formulas.
 fn check_name(key: String, name: &str) -> Outcome<()> {
     if !is_name(name) {
         let problem =
@@ -48,10 +48,10 @@ fn check_name(key: String, name: &str) -> Outcome<()> {
 }
 
 impl Description {
-    /// The system, its Lagrangian ready to be evaluated.
+    /// Builds the system, with its Lagrangian compiled.
     ///
     /// # Errors
-    /// The first wrong key, and its problem.
+    /// The first invalid key and the problem.
     pub fn system(&self) -> Outcome<System> {
         let taken = constrained_description(&self.name);
         if systems().iter().any(|system| system.name == self.name)
@@ -63,15 +63,15 @@ impl Description {
         self.unfolded()?.compile_plain(self, false)
     }
 
-    /// Compiles a description of the catalogue, which may be larger than one in a file and has independent constraints.
+    /// Compiles a description of the catalogue, which may be larger than one in a file and whose constraints are independent.
     ///
     /// # Errors
-    /// The first wrong key, and its problem.
+    /// The first invalid key and the problem.
     pub(in crate::mechanics::lagrangian) fn compile(&self) -> Outcome<System> {
         self.unfolded()?.compile_plain(self, true)
     }
 
-    /// Compiles a description without links, which may be `written` with some; it is of the catalogue or of a file.
+    /// Compiles a description whose links are expanded; `written` is the original, and `catalogued` tells whether it is in the catalogue.
     fn compile_plain(self, written: &Self, catalogued: bool) -> Outcome<System> {
         let chain = written.shape(&self.parameters).map(Arc::new);
         self.check_texts()?;
@@ -129,7 +129,7 @@ impl Description {
         })
     }
 
-    /// The Lagrangian, and for a metric the velocity of the time-like coordinate on its mass shell.
+    /// Returns the Lagrangian, and for a metric the velocity of the time-like coordinate on the mass shell.
     fn lagrangian_and_shell(
         &self,
         compiler: &mut Compiler,
@@ -156,7 +156,7 @@ impl Description {
         }
     }
 
-    /// The unit of the time: seconds, or none for a proper time, unless it is given.
+    /// Returns the given unit of time; by default seconds, or none for proper time.
     fn unit_of_time(&self, is_proper: bool) -> Cow<'static, str> {
         match &self.time_unit {
             Some(unit) => Cow::Owned(unit.clone()),
@@ -164,7 +164,7 @@ impl Description {
         }
     }
 
-    /// Names and units that are shown: short, on one line.
+    /// Checks that displayed names and units are short and on one line.
     fn check_texts(&self) -> Outcome<()> {
         let plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
         let name = &self.name;
@@ -191,7 +191,7 @@ impl Description {
         Ok(())
     }
 
-    /// How much there may be in a file; the constants of its links, written out, come on top.
+    /// Checks the number of entries; the expanded constants of links are not counted.
     fn check_counts(&self, plain: &Self) -> Outcome<()> {
         let n = plain.coordinates.len();
         let of_links = self.links.len() * CONSTANTS;
@@ -215,8 +215,8 @@ impl Description {
         Ok(())
     }
 
-    /// Meaning of the names of coordinates, velocities and parameters, and of `t`, the time, if nothing else has this name; whether equations
-    /// of motion depend on it.
+    /// Returns the meaning of the names of coordinates, velocities, parameters and the time `t`, unless something else has that name; also
+    /// whether the equations of motion depend on the time.
     fn scope(&self) -> Outcome<(BTreeMap<String, Meaning>, bool)> {
         let mut scope = BTreeMap::new();
         let mut add = |key: String, name: &str, meaning: Meaning| {
@@ -245,7 +245,7 @@ impl Description {
         for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| self.marks.contains(*name)) {
             add(format!("inputs.{name}"), name, Meaning::Position(self.coordinates.len() + 1 + k))?;
         }
-        // Taken, though without a meaning yet.
+        // Reserve these names, although they have no meaning yet.
         for name in self.definitions.keys() {
             add(format!("definitions.{name}"), name, Meaning::Parameter(usize::MAX))?;
         }
@@ -253,7 +253,7 @@ impl Description {
         Ok((scope, timed))
     }
 
-    /// Compiles the definitions, each after those that it needs.
+    /// Compiles the definitions in order of dependence.
     fn define(&self, compiler: &mut Compiler, scope: &mut BTreeMap<String, Meaning>) -> Outcome<()> {
         let key = |name: &str| format!("definitions.{name}");
         let mut waiting: Vec<Waiting<'_>> = Vec::with_capacity(self.definitions.len());
@@ -283,12 +283,12 @@ impl Description {
         Ok(())
     }
 
-    /// The Lagrangian as written in the file.
+    /// Compiles the Lagrangian of the file.
     fn written(&self, text: &str, compiler: &mut Compiler, scope: &BTreeMap<String, Meaning>) -> Outcome<Value> {
         let expression: Expression = text.parse().map_err(DescriptionError::formula("lagrangian"))?;
         let value = compiler.add(&expression, scope, false).map_err(DescriptionError::formula("lagrangian"))?;
         let velocities = compiler.velocities(value);
-        // Coordinates that constraints move need no inertia.
+        // Coordinates that follow from constraints need no inertia.
         for (i, coordinate) in self.coordinates.iter().enumerate().filter(|_| self.constraints.is_empty()) {
             if !velocities.contains(&i) {
                 let name = &coordinate.name;
@@ -302,7 +302,7 @@ impl Description {
         Ok(value)
     }
 
-    /// The dissipation function, which moves nothing unless it depends on a velocity.
+    /// Compiles the dissipation function, which must depend on a velocity to have an effect.
     fn friction(&self, compiler: &mut Compiler, scope: &BTreeMap<String, Meaning>) -> Outcome<Option<Value>> {
         let Some(text) = &self.dissipation else { return Ok(None) };
         let expression: Expression = text.parse().map_err(DescriptionError::formula("dissipation"))?;
@@ -313,7 +313,7 @@ impl Description {
         Ok(Some(value))
     }
 
-    /// The generalized forces as functions of the coordinates and parameters.
+    /// Compiles the generalized forces as functions of the coordinates and parameters.
     fn forces(
         &self,
         compiler: &mut Compiler,
@@ -335,7 +335,7 @@ impl Description {
         Ok((!formulas.is_empty()).then(|| FormulaForces::compiled(size, formulas)))
     }
 
-    /// The names in formulas of forces, including inputs.
+    /// Extends the names by inputs, for formulas of forces.
     pub(super) fn with_inputs(&self, scope: &BTreeMap<String, Meaning>) -> Outcome<BTreeMap<String, Meaning>> {
         let mut scope = scope.clone();
         for (k, name) in self.inputs.keys().enumerate().filter(|(_, name)| !self.marks.contains(*name)) {
@@ -354,25 +354,25 @@ impl Description {
         Ok(scope)
     }
 
-    /// `true` if there are inputs, or if the Lagrangian, the dissipation function or forces depend on the time `t`, which nothing else may be
-    /// called.
+    /// Returns `true` if there are inputs, or if the Lagrangian, the dissipation function or forces depend on the time `t`. Nothing else
+    /// may then be called `t`.
     fn is_timed(&self) -> bool {
         let metric = self.metric.iter().flat_map(|entries| entries.values());
         let mut texts = self.lagrangian.iter().chain(&self.dissipation).chain(self.forces.values()).chain(metric);
         !self.inputs.is_empty() || !self.time_is_taken() && texts.any(|text| self.names_time(text))
     }
 
-    /// `true` if something else is called `t`.
+    /// Returns `true` if something else is called `t`.
     fn time_is_taken(&self) -> bool {
         let names = self.coordinates.iter().map(|coordinate| &coordinate.name);
         names.chain(self.parameters.keys()).chain(self.definitions.keys()).any(|name| name == TIME)
     }
 
-    /// `true` if `t` is in a formula, or in a definition that it needs.
+    /// Returns `true` if a formula, or a definition that it uses, contains `t`.
     fn names_time(&self, text: &str) -> bool {
         let (mut texts, mut seen) = (vec![text], BTreeSet::new());
         while let Some(text) = texts.pop() {
-            // A mistake in it is reported where it is compiled.
+            // Errors in it are reported when it is compiled.
             let Ok(expression) = text.parse::<Expression>() else { continue };
             for name in expression.names() {
                 if name == TIME {
@@ -388,7 +388,7 @@ impl Description {
         false
     }
 
-    /// The formulas that vanish.
+    /// Compiles the constraints.
     fn constraints(
         &self,
         compiler: &mut Compiler,
@@ -416,7 +416,7 @@ impl Description {
         compiled.map(Some).map_err(place)
     }
 
-    /// The entries `(i, j)`, `i <= j`, of the metric.
+    /// Parses the entries `(i, j)`, `i <= j`, of the metric.
     fn metric_entries(
         &self,
         entries: &BTreeMap<String, String>,
@@ -454,7 +454,7 @@ impl Description {
         Ok(metric)
     }
 
-    /// The one coordinate that is a time.
+    /// Returns the index of the time-like coordinate.
     fn time_like(&self) -> Outcome<Option<usize>> {
         let mut times = self.coordinates.iter().enumerate().filter(|(_, c)| c.time_like).map(|(i, _)| i);
         let (first, second) = (times.next(), times.next());
@@ -466,7 +466,7 @@ impl Description {
         }
     }
 
-    /// The coordinates' own bounds; the velocity that a mass shell fixes has none.
+    /// Returns the bounds of the coordinates; a velocity that follows from the mass shell has none.
     fn base_bounds(&self, fixed: Option<usize>) -> Outcome<Bounds> {
         let mut bounds = Bounds { positions: Vec::new(), velocities: Vec::new() };
         for (i, coordinate) in self.coordinates.iter().enumerate() {
@@ -486,7 +486,7 @@ impl Description {
         Ok(bounds)
     }
 
-    /// A box with the columns that a table names replaced.
+    /// Returns a box of states, with the columns in a table replaced.
     fn bounds(&self, table: &str, given: &BTreeMap<String, [Quantity; 2]>, base: Bounds) -> Outcome<Bounds> {
         let mut bounds = base;
         for (column, pair) in given {
@@ -506,7 +506,7 @@ impl Description {
         Ok(bounds)
     }
 
-    /// The shell of the training states; `time` is the time-like coordinate of a mass shell.
+    /// Returns the shell of the training states; `time` is the time-like coordinate of the mass shell.
     fn shell_advice(&self, time: Option<usize>) -> Outcome<Option<ShellAdvice>> {
         let Some(shell) = &self.shell else { return Ok(None) };
         if time.is_none() {
@@ -558,7 +558,7 @@ impl Description {
                 format!("expected at least a millionth of t_end = {t_end}"),
             ));
         }
-        // An angle may start anywhere.
+        // A trajectory may start at any angle.
         let half = |&(low, high): &(f64, f64)| (0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high);
         let middle = Bounds {
             positions: validation
@@ -602,7 +602,7 @@ impl Description {
     }
 }
 
-/// `true` if a coordinate may have a name that nothing else in the file has.
+/// Returns `true` if a name is valid for a coordinate and not reserved.
 pub fn is_free_name(name: &str) -> bool {
     is_name(name) && !is_reserved(name)
 }
@@ -615,7 +615,7 @@ fn coordinate(described: &super::CoordinateDescription) -> Coordinate {
     }
 }
 
-/// Finite bounds with room between them.
+/// Checks that bounds are finite and in increasing order.
 fn ordered(key: &str, &[Quantity(low), Quantity(high)]: &[Quantity; 2]) -> Outcome<(f64, f64)> {
     if low.is_finite() && high.is_finite() && low < high && (high - low).is_finite() {
         return Ok((low, high));
@@ -623,15 +623,15 @@ fn ordered(key: &str, &[Quantity(low), Quantity(high)]: &[Quantity; 2]) -> Outco
     Err(DescriptionError::new(key, format!("expected [low, high], finite and in this order, found [{low}, {high}]")))
 }
 
-/// A definition that has not been compiled yet.
+/// A definition that is not compiled yet.
 struct Waiting<'a> {
     name: &'a str,
-    /// The definitions in its formula.
+    /// Definitions that its formula uses.
     needs: BTreeSet<&'a str>,
     expression: Expression,
 }
 
-/// Definitions that need each other, by the first of them, with the way around.
+/// Finds definitions that depend on each other; returns the first of them and the cycle in words.
 fn circle(waiting: &[Waiting<'_>]) -> (String, String) {
     let next = |name: &str| {
         let found = waiting.iter().find(|known| known.name == name)?;
@@ -657,7 +657,7 @@ fn circle(waiting: &[Waiting<'_>]) -> (String, String) {
 
 type Metric = BTreeMap<(usize, usize), Value>;
 
-/// `g_ij v_i v_j / 2`.
+/// Computes `g_ij v_i v_j / 2`.
 fn kinetic(compiler: &mut Compiler, metric: &Metric, n: usize) -> Value {
     let speeds: Vec<Value> = (0..n).map(|i| compiler.meaning(Meaning::Velocity(i))).collect();
     let half = compiler.constant(0.5);
@@ -668,8 +668,8 @@ fn kinetic(compiler: &mut Compiler, metric: &Metric, n: usize) -> Value {
     })
 }
 
-/// `v_t` with `g(v, v) = -1`: of `g_tt v_t^2 + 2 b v_t + c + 1 = 0` the root to the future, where `g_tt < 0`:
-/// `-(b + sqrt(b^2 - g_tt (c + 1))) / g_tt`.
+/// Computes `v_t` with `g(v, v) = -1`: the root of `g_tt v_t^2 + 2 b v_t + c + 1 = 0` that points to the future, `-(b + sqrt(b^2 - g_tt (c
+/// + 1))) / g_tt`, where `g_tt < 0`.
 fn on_shell(compiler: &mut Compiler, metric: &Metric, t: usize, n: usize) -> Value {
     let speeds: Vec<Value> = (0..n).map(|i| compiler.meaning(Meaning::Velocity(i))).collect();
     let entries = || metric.iter().map(|(&(i, j), &g)| (g, i, j));
@@ -695,7 +695,7 @@ fn on_shell(compiler: &mut Compiler, metric: &Metric, t: usize, n: usize) -> Val
     compiler.unary(Unary::Neg, quotient)
 }
 
-/// The sum of terms, 0 if there are none.
+/// Sums the terms; 0 without terms.
 fn sum<T>(
     compiler: &mut Compiler,
     parts: impl Iterator<Item = T>,

@@ -1,4 +1,4 @@
-//! From trees of names to one program of operations that shares equal parts.
+//! Compiles trees of names to one program of operations, in which equal parts are shared.
 
 use super::parse::Number;
 use super::{Expression, ExpressionError, Node, PI};
@@ -10,19 +10,19 @@ use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Most operations of a program.
+/// Largest number of operations of a program.
 const MAX_OPERATIONS: usize = 1 << 16;
 
-/// Meaning of a name.
+/// The meaning of a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Meaning {
-    /// A parameter by its place.
+    /// The index of a parameter.
     Parameter(usize),
-    /// A coordinate by its place.
+    /// The index of a coordinate.
     Position(usize),
-    /// The velocity of a coordinate.
+    /// The index of a coordinate whose velocity is meant.
     Velocity(usize),
-    /// Formulas compiled before.
+    /// A formula that is already compiled.
     Value(Value),
 }
 
@@ -41,7 +41,7 @@ enum Entry {
     Binary(Binary, Value, Value),
 }
 
-/// Operations so far.
+/// Compiles formulas into a common list of operations.
 #[derive(Default)]
 pub struct Compiler {
     entries: Vec<Entry>,
@@ -53,10 +53,10 @@ pub struct Compiler {
 }
 
 impl Compiler {
-    /// Adds a formula whose names `scope` defines; `still` refuses velocities.
+    /// Adds a formula whose names are defined in `scope`; with `still`, velocities are rejected.
     ///
     /// # Errors
-    /// A name that is not in scope or not allowed, or a program that becomes too long.
+    /// A name is not in scope or not allowed, or the program becomes too long.
     pub fn add(
         &mut self,
         expression: &Expression,
@@ -99,7 +99,7 @@ impl Compiler {
         }
     }
 
-    /// The value of an input.
+    /// Returns the value of an input.
     pub fn meaning(&mut self, meaning: Meaning) -> Value {
         match meaning {
             Meaning::Parameter(i) => self.entry(Entry::Parameter(i as u32)),
@@ -109,12 +109,12 @@ impl Compiler {
         }
     }
 
-    /// `true` if a value depends on velocities.
+    /// Returns `true` if a value depends on velocities.
     pub fn moves(&self, value: Value) -> bool {
         self.moving[value.0 as usize]
     }
 
-    /// A number that every precision has.
+    /// Adds a number that is exact in every precision.
     pub fn constant(&mut self, value: f64) -> Value {
         self.number(Number::exact(value))
     }
@@ -135,12 +135,12 @@ impl Compiler {
         }
     }
 
-    /// A function of one number.
+    /// Adds a function of one value.
     pub fn unary(&mut self, function: Unary, a: Value) -> Value {
         self.entry(Entry::Unary(function, a))
     }
 
-    /// A function of two numbers; a quotient by a power of two is the product with its reciprocal, which is as exact.
+    /// Adds a function of two values. Division by a power of two becomes multiplication by its reciprocal, which is equally exact.
     pub fn binary(&mut self, function: Binary, a: Value, b: Value) -> Value {
         match (function, self.number_of(b).and_then(Number::exact_reciprocal)) {
             (Binary::Div, Some(reciprocal)) => {
@@ -152,7 +152,7 @@ impl Compiler {
         }
     }
 
-    /// `a^b`: by multiplication for whole numbers, a square root for one half.
+    /// Adds `a^b`, as multiplications for integer exponents and a square root for one half.
     fn power(&mut self, a: Value, b: Value) -> Value {
         let exponent = match self.entries[b.0 as usize] {
             Entry::Unary(Unary::Neg, b) => self.number_of(b).and_then(Number::integer).and_then(i32::checked_neg),
@@ -184,13 +184,13 @@ impl Compiler {
         value
     }
 
-    /// `true` if a value depends on neither coordinates nor velocities.
+    /// Returns `true` if a value depends on neither coordinates nor velocities.
     pub fn is_constant(&self, value: Value) -> bool {
         let entries = self.entries.iter().zip(self.needed(value)).filter(|(_, needed)| *needed);
         entries.into_iter().all(|(entry, _)| !matches!(entry, Entry::Position(_) | Entry::Velocity(_)))
     }
 
-    /// Degree of a value in the velocities, 0 or 1, according to its operations; `None` if it is not linear in them.
+    /// Returns the degree of a value in the velocities, 0 or 1, as its operations show; `None` if it is not linear in them.
     pub fn velocity_degree(&self, value: Value) -> Option<u8> {
         let mut degrees: Vec<Option<u8>> = Vec::with_capacity(value.0 as usize + 1);
         for entry in &self.entries[..=value.0 as usize] {
@@ -211,23 +211,23 @@ impl Compiler {
         degrees[value.0 as usize]
     }
 
-    /// The velocities that a value depends on, by their coordinate.
+    /// Returns the velocities that a value depends on, by the index of their coordinate.
     pub fn velocities(&self, value: Value) -> Vec<usize> {
         self.given(value, |entry| if let Entry::Velocity(i) = entry { Some(*i as usize) } else { None })
     }
 
-    /// The coordinates that a value depends on, by their place.
+    /// Returns the indices of the coordinates that a value depends on.
     pub fn positions(&self, value: Value) -> Vec<usize> {
         self.given(value, |entry| if let Entry::Position(i) = entry { Some(*i as usize) } else { None })
     }
 
-    /// The picked entries that a value depends on.
+    /// Returns what `pick` selects from the entries that a value depends on.
     fn given(&self, value: Value, pick: impl Fn(&Entry) -> Option<usize>) -> Vec<usize> {
         let entries = self.entries.iter().zip(self.needed(value)).filter(|(_, needed)| *needed);
         entries.filter_map(|(entry, _)| pick(entry)).collect()
     }
 
-    /// Which entries a value is made of.
+    /// Returns which entries a value depends on.
     fn needed(&self, value: Value) -> Vec<bool> {
         let mut needed = vec![false; self.entries.len()];
         needed[value.0 as usize] = true;
@@ -241,7 +241,7 @@ impl Compiler {
         needed
     }
 
-    /// The program of one value: registers are used again as soon as nothing needs them.
+    /// Returns the program of one value; registers are reused once their contents are no longer needed.
     pub fn formula(&self, value: Value) -> Formula {
         let needed = self.needed(value);
         let mut last_use = vec![0; self.entries.len()];
@@ -301,7 +301,7 @@ impl Compiler {
     }
 }
 
-/// Kind and operands of an operation.
+/// Returns the operands of an operation.
 fn operands(entry: Entry) -> [Option<Value>; 2] {
     match entry {
         Entry::Unary(_, a) => [Some(a), None],
@@ -319,7 +319,7 @@ impl Value {
     }
 }
 
-/// The location of a number.
+/// The source of an operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Operand {
     Register(u32),
@@ -336,14 +336,14 @@ pub(super) enum Operation {
     Binary(Binary, Operand, Operand),
 }
 
-/// An operation and the register that takes its result.
+/// An operation and the register for its result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Instruction {
     pub operation: Operation,
     pub out: u32,
 }
 
-/// A program of operations on registers with one result, a function of parameters, coordinates and velocities.
+/// A program of register operations with one result, a function of parameters, coordinates and velocities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formula {
     instructions: Vec<Instruction>,
@@ -352,7 +352,7 @@ pub struct Formula {
     result: Operand,
 }
 
-/// Programs with at most this many registers keep them on the stack.
+/// Programs with at most this many registers store them on the stack.
 const FEW: usize = 16;
 
 impl Formula {
@@ -360,7 +360,7 @@ impl Formula {
         Self { instructions, numbers, registers: registers as usize, result }
     }
 
-    /// The value; `NaN` where a parameter, a coordinate or a velocity is missing.
+    /// Evaluates the program; returns `NaN` if a parameter, a coordinate or a velocity is missing.
     pub fn evaluate<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         if self.registers <= FEW {
             self.run(&mut [R::zero(); FEW], parameters, q, v)

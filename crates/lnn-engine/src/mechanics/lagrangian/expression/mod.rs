@@ -8,9 +8,9 @@
 //! atom    = number | "pi" | name | function "(" sum { "," sum } ")" | "(" sum ")"
 //! ```
 //!
-//! [`Expression`] is a parsed text; [`Compiler`] gives its names a meaning and shares common parts; [`Formula`] is the result, evaluated
-//! over any [`Real`](crate::scalar::Real): floats, forward numbers, tracers of a tape. Numbers keep the value of their decimal text in the
-//! precision of the evaluation.
+//! [`Expression`] is a parsed text; [`Compiler`] resolves its names and shares common parts; [`Formula`] is the result, which can be
+//! evaluated over any [`Real`](crate::scalar::Real): floats, forward-mode numbers, tracers of a tape. Decimal numbers are rounded only in
+//! the precision of the evaluation.
 
 mod compile;
 mod parse;
@@ -29,12 +29,12 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 
-/// A mistake in the text of a formula.
+/// An error in the text of a formula.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExpressionError {
-    /// Character of the text where it is, from 1.
+    /// Position of the error in the text: the number of the character, from 1.
     pub column: usize,
-    /// The mistake, and what was expected.
+    /// The error, and what was expected.
     pub problem: String,
 }
 
@@ -53,12 +53,12 @@ impl ExpressionError {
     }
 }
 
-/// A part of a formula; operands are parts before it.
+/// A node of a formula; its operands are earlier nodes.
 #[derive(Clone, Debug, PartialEq)]
 enum Node {
-    /// A decimal number without sign.
+    /// A decimal number without a sign.
     Number(String),
-    /// The circle constant.
+    /// The constant pi.
     Pi,
     /// A name and its column.
     Name(String, usize),
@@ -68,15 +68,15 @@ enum Node {
     Binary(Binary, u32, u32),
 }
 
-/// A formula as a tree, written `m*l^2*theta_dot^2/2`; [`fmt::Display`] writes text that reads back to the same formula.
+/// A formula as a tree, such as `m*l^2*theta_dot^2/2`; [`fmt::Display`] writes text that parses to the same formula.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
-    /// Operands before the operations on them, the whole formula last.
+    /// Nodes in order, operands before operations; the last one is the whole formula.
     nodes: Vec<Node>,
 }
 
 impl Expression {
-    /// The names of quantities in it, in order, each as often as it occurs.
+    /// Returns the names in the formula, in order and with repetitions.
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
         self.nodes.iter().filter_map(|node| match node {
             Node::Name(name, _) => Some(name.as_str()),
@@ -85,7 +85,7 @@ impl Expression {
     }
 }
 
-/// Precedence of a part: sums, products, signs, powers, atoms.
+/// Precedence of a node: sums, products, signs, powers, atoms.
 const SUM: u8 = 0;
 const PRODUCT: u8 = 1;
 const SIGN: u8 = 2;
@@ -94,7 +94,7 @@ const ATOM: u8 = 4;
 
 impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Every part is an operand once: its text moves into the text of the whole.
+        // Every node is an operand exactly once, so its text can be moved.
         let mut texts: Vec<(String, u8)> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
             let mut operand = |index: u32, least: u8| {
@@ -133,7 +133,7 @@ enum Function {
     Two(Binary),
 }
 
-/// All functions; if one has two names, the first is written.
+/// All functions; if a function has two names, the first one is written.
 const FUNCTIONS: [(&str, Function); 26] = [
     ("sqrt", Function::One(Unary::Sqrt)),
     ("exp", Function::One(Unary::Exp)),
@@ -163,28 +163,28 @@ const FUNCTIONS: [(&str, Function); 26] = [
     ("min", Function::Two(Binary::Min)),
 ];
 
-/// The circle constant.
+/// Name of the constant pi.
 const PI: &str = "pi";
 
-/// The function of a name.
+/// Returns the function with a name.
 fn function(name: &str) -> Option<Function> {
     FUNCTIONS.iter().find(|(known, _)| *known == name).map(|(_, function)| *function)
 }
 
-/// The name of a function, which the operators do not have.
+/// Returns the name of a function; `None` for operators.
 fn name_of(function: Function) -> Option<&'static str> {
     FUNCTIONS.iter().find(|(_, known)| *known == function).map(|(name, _)| *name)
 }
 
-/// `true` if a name means something in every formula.
+/// Returns `true` if a name has a fixed meaning in every formula.
 pub(super) fn is_reserved(name: &str) -> bool {
     name == PI || function(name).is_some()
 }
 
-/// The value of a decimal number or of a formula of numbers, such as `2*pi`, in the precision of `S`.
+/// Evaluates a decimal number or a formula of numbers, such as `2*pi`, in the precision of `S`.
 ///
 /// # Errors
-/// A mistake in the formula, with its column.
+/// An error in the formula, with its column.
 #[cfg(feature = "serde")]
 pub fn quantity<S: Scalar>(text: &str) -> Result<S, ExpressionError> {
     if let Some(number) = S::parse(text.trim()) {
@@ -196,16 +196,16 @@ pub fn quantity<S: Scalar>(text: &str) -> Result<S, ExpressionError> {
     Ok(compiler.formula(value).evaluate::<S>(&[], &[], &[]))
 }
 
-/// A formula of named numbers, such as `0.3*cos(1.2*t)` of the number `t`.
+/// A formula with named variables, such as `0.3*cos(1.2*t)` of the variable `t`.
 #[derive(Clone, Debug)]
 pub struct NamedFormula {
-    /// Its names, each once.
+    /// Its variables, without repetitions.
     pub names: Vec<String>,
     formula: Arc<Formula>,
 }
 
 impl NamedFormula {
-    /// Its value for these values of its names.
+    /// Evaluates the formula for these values of its variables.
     pub fn value(&self, values: &[f64]) -> f64 {
         self.formula.evaluate(values, &[], &[])
     }
@@ -226,7 +226,7 @@ impl core::str::FromStr for NamedFormula {
     }
 }
 
-/// `L(q, v; parameters)` by a formula such as `m*l^2*theta_dot^2/2 + m*g*l*cos(theta)`.
+/// A Lagrangian `L(q, v; parameters)` given by a formula such as `m*l^2*theta_dot^2/2 + m*g*l*cos(theta)`.
 ///
 /// ```
 /// use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, Request, Terms};
@@ -246,11 +246,10 @@ pub struct ExpressionLagrangian {
 }
 
 impl ExpressionLagrangian {
-    /// The Lagrangian of a formula over coordinates, their velocities `NAME_dot`, and parameters in the order in which they
-    /// will be given.
+    /// Compiles a formula of coordinates, their velocities `NAME_dot`, and parameters, which are given later in the same order.
     ///
     /// # Errors
-    /// A mistake in the formula, with its column.
+    /// An error in the formula, with its column.
     pub fn new(coordinates: &[&str], parameters: &[&str], formula: &str) -> Result<Self, ExpressionError> {
         let expression: Expression = formula.parse()?;
         let positions = coordinates.iter().enumerate().map(|(i, name)| (name.to_string(), Meaning::Position(i)));
@@ -263,7 +262,7 @@ impl ExpressionLagrangian {
         Ok(Self::compiled((coordinates.len(), count), compiler.formula(value)))
     }
 
-    /// The Lagrangian of `n` coordinates and some parameters whose value is a compiled formula.
+    /// Returns the Lagrangian of `n` coordinates with a compiled formula and a number of parameters.
     pub(in crate::mechanics::lagrangian) fn compiled(
         (coordinates, parameters): (usize, usize),
         value: Formula,

@@ -1,4 +1,4 @@
-//! From a text to a tree: numbers, names and signs, then recursive descent that writes operands before the operations on them.
+//! Parses a text into a tree: a tokenizer, then recursive descent that writes operands before operations.
 
 use super::{Expression, ExpressionError, FUNCTIONS, Function, Node, PI, function};
 use crate::names::nearest;
@@ -10,10 +10,10 @@ use core::str::FromStr;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-/// Deepest nesting of parentheses, signs and powers: far more than formulas need, far less than the stack allows.
+/// Deepest nesting of parentheses, signs and powers: more than formulas need, and far below what the stack allows.
 const MAX_DEPTH: usize = 100;
 
-/// Reads a formula.
+/// Parses a formula.
 pub(super) fn parse(text: &str) -> Result<Expression, ExpressionError> {
     let mut parser = Parser { tokens: tokens(text)?, at: 0, depth: 0, nodes: Vec::new() };
     if parser.next().kind == Lexeme::End {
@@ -37,14 +37,14 @@ struct Parser<'a> {
 type Outcome = Result<u32, ExpressionError>;
 
 impl<'a> Parser<'a> {
-    /// The next token; behind the last one, always the end.
+    /// Returns the next token; after the last one, always the end.
     fn next(&self) -> Token<'a> {
         self.tokens[self.at.min(self.tokens.len() - 1)]
     }
     fn advance(&mut self) {
         self.at += 1;
     }
-    /// Consumes the next token if it is this sign; `true` if it was.
+    /// Consumes the next token and returns `true` if it is this sign.
     fn takes(&mut self, sign: char) -> bool {
         let found = self.next().kind == Lexeme::Sign(sign);
         self.at += usize::from(found);
@@ -208,10 +208,10 @@ impl FromStr for Expression {
     }
 }
 
-/// Most characters of a formula.
+/// Largest number of characters of a formula.
 const MAX_CHARACTERS: usize = 1 << 16;
 
-/// A piece of a formula.
+/// A lexeme of a formula.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Lexeme<'a> {
     Number(&'a str),
@@ -220,16 +220,16 @@ enum Lexeme<'a> {
     End,
 }
 
-/// A piece with its place.
+/// A lexeme with its position.
 #[derive(Clone, Copy, Debug)]
 struct Token<'a> {
     pub kind: Lexeme<'a>,
-    /// Character, from 1.
+    /// Number of the character, from 1.
     pub column: usize,
 }
 
 impl Token<'_> {
-    /// The piece in a message.
+    /// Returns the lexeme for a message.
     pub fn shown(&self) -> String {
         match self.kind {
             Lexeme::Number(text) | Lexeme::Name(text) => format!("`{}`", text.chars().take(40).collect::<String>()),
@@ -247,12 +247,12 @@ fn continues_name(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// `true` if a text is one name: a letter or `_`, then letters, digits and `_`.
+/// Returns `true` if a text is one name: a letter or `_`, then letters, digits and `_`.
 pub fn is_name(text: &str) -> bool {
     text.starts_with(begins_name) && text.chars().all(continues_name) && text.chars().count() <= 64
 }
 
-/// The pieces of a text, the end among them.
+/// Splits a text into tokens, including the end.
 fn tokens(text: &str) -> Result<Vec<Token<'_>>, ExpressionError> {
     if text.chars().nth(MAX_CHARACTERS).is_some() {
         return Err(ExpressionError::new(1, format!("expected a formula of at most {MAX_CHARACTERS} characters")));
@@ -284,7 +284,7 @@ fn tokens(text: &str) -> Result<Vec<Token<'_>>, ExpressionError> {
     Ok(found)
 }
 
-/// Bytes of the number that a text begins with: digits, a point among them, and an exponent if there are digits in it.
+/// Returns the length in bytes of the number at the start of a text: digits with an optional point, and an exponent if it has digits.
 fn number_length(text: &str) -> usize {
     let bytes = text.as_bytes();
     let digits = |from: usize| bytes[from..].iter().take_while(|b| b.is_ascii_digit()).count();
@@ -315,36 +315,36 @@ pub(super) struct Number {
 }
 
 impl Number {
-    /// Reads decimal text that a scalar's own parser accepts; `None` if it is not finite.
+    /// Parses decimal text in the syntax of the scalars; returns `None` if it is not finite.
     pub fn parse(text: &str) -> Option<Self> {
         let (exact, single) = (Dd::parse(text)?, f32::parse(text)?);
         exact.is_finite().then_some(Self { exact, single })
     }
-    /// A number that every precision has.
+    /// Returns a number that is exact in every precision.
     pub fn exact(value: f64) -> Self {
         Self { exact: Dd::of_f64(value), single: value as f32 }
     }
-    /// The number nearest to the decimal text.
+    /// Returns the number nearest to the decimal text.
     pub fn value<S: Scalar>(self) -> S {
         if S::NAME == f32::NAME { S::of_f64(f64::from(self.single)) } else { self.exact.cast() }
     }
-    /// Its value if it is an integer that can be an exponent.
+    /// Returns its value if it is an integer that can be an exponent.
     pub fn integer(self) -> Option<i32> {
         let (high, low) = self.exact.parts();
         let whole = low == 0.0 && high.fract() == 0.0 && high.abs() <= f64::from(i32::MAX);
         whole.then_some(high as i32)
     }
-    /// `1 / x` if that is exact in every precision: `x` a power of two of moderate size.
+    /// Returns `1 / x` if that is exact in every precision, that is, for a power of two of moderate size.
     pub fn exact_reciprocal(self) -> Option<Self> {
         let (high, low) = self.exact.parts();
         let power = low == 0.0 && high > 0.0 && high.log2().fract() == 0.0 && (-100.0..=100.0).contains(&high.log2());
         (power && high == 2f64.powi(high.log2() as i32)).then(|| Self::exact(1.0 / high))
     }
-    /// `true` if it is this `f64`.
+    /// Returns `true` if it equals this `f64`.
     pub fn is(self, value: f64) -> bool {
         self.exact.parts() == (value, 0.0)
     }
-    /// Key that equal numbers share.
+    /// Returns a key that equal numbers share.
     pub fn bits(self) -> (u64, u64, u32) {
         let (high, low) = self.exact.parts();
         (high.to_bits(), low.to_bits(), self.single.to_bits())

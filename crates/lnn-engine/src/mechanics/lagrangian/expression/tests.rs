@@ -114,7 +114,7 @@ fn numbers_are_read_in_the_precision_of_the_run() {
     assert_eq!(evaluate("0.1", point), Ok(tenth));
     assert_ne!(Dd::of_f64(0.1), tenth);
     assert_eq!(evaluate("pi", point), Ok(<Dd as Scalar>::pi()));
-    // Between two f32 numbers: rounded once, not via f64.
+    // This number is between two f32 numbers and must be rounded once, not via f64.
     let text = "1.000000059604644775390625000000000000001";
     assert_eq!(evaluate(text, POINT.map(|x| x as f32)), Ok(f32::parse(text).unwrap()));
     assert_ne!(f32::parse(text).unwrap(), f64::parse(text).unwrap() as f32);
@@ -126,11 +126,11 @@ fn what_occurs_twice_is_computed_once() {
     let mut compiler = Compiler::default();
     let value = compiler.add(&expression, &scope(), false).unwrap();
     let formula = format!("{:?}", compiler.formula(value));
-    // x*y, its sum, the square, sine, product, cosine, a quarter of it, the sum.
+    // The operations: x*y, its sum, the square, sine, product, cosine, a quarter of it, the sum.
     assert_eq!(formula.matches("Instruction").count(), 8, "{formula}");
 }
 
-/// Texts of random formulas over the names of [`scope`].
+/// Generates random formulas over the names of [`scope`].
 fn formulas() -> impl Strategy<Value = String> {
     let number = (0u32..1000, -3i32..3).prop_map(|(digits, power)| format!("{digits}e{power}"));
     let leaf = prop_oneof![
@@ -166,7 +166,7 @@ proptest! {
         prop_assert!(same(evaluate(&text, point).unwrap(), evaluate(&printed, point).unwrap()), "{} {}", text, printed);
         let wide = point.map(Dd::of_f64);
         prop_assert!(same(evaluate(&text, wide).unwrap(), evaluate(&printed, wide).unwrap()));
-        // Forward numbers carry the same value.
+        // Forward-mode numbers have the same value.
         let jets: [Jet2<f64, 2>; 5] = std::array::from_fn(|i| if i < 2 { Jet2::variable(point[i], i) } else { Jet2::lift(point[i]) });
         prop_assert!(same(evaluate(&text, jets).unwrap().value, evaluate(&text, point).unwrap()));
     }

@@ -1,22 +1,22 @@
-//! Derivatives of models and forces that are given as values alone: central differences of the fourth order.
+//! Derivatives of models and forces that only provide values: central differences of the fourth order.
 
 use super::{Held, Slopes};
 use crate::lagrangian::{EulerLagrange, GeneralizedForce, MechanicsError, Request, Terms};
 use crate::scalar::{Real, Scalar, update};
 use alloc::vec::Vec;
 
-/// Multiples of the step, and the weights of the values there; `12 h f' = f(-2h) - 8 f(-h) + 8 f(h) - f(2h)`.
+/// Multiples of the step, and the weights of the function values there: `12 h f' = f(-2h) - 8 f(-h) + 8 f(h) - f(2h)`.
 const STENCIL: [(f64, f64); 4] = [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)];
 
-/// The step that balances rounding against the error of the formula, `h^4`, where functions vary over the size of their arguments.
+/// Returns the step that balances rounding against the truncation error, `h^4`, for functions that vary over the size of their arguments.
 fn step<S: Scalar>(x: S) -> S {
     let size = x.abs();
     let h = S::epsilon().powf(S::of_f64(0.2)) * if size > <S as Real>::one() { size } else { <S as Real>::one() };
-    // A step that the sum represents.
+    // Make the step exactly representable in the sum.
     (x + h) - x
 }
 
-/// Calls `f` with every displaced state, `(q, v)` in one vector, the displaced column and the factor of its value.
+/// Calls `f` with every displaced state, `(q, v)` in one vector, the displaced column and the weight of its value.
 fn displaced<S: Scalar>(
     (q, v): (&[S], &[S]),
     mut f: impl FnMut(&[S], usize, S) -> Result<(), MechanicsError>,
@@ -33,7 +33,7 @@ fn displaced<S: Scalar>(
     Ok(())
 }
 
-/// [`Slopes`] of a whole model by differences of its terms.
+/// Computes the [`Slopes`] of a model with differences of its terms.
 pub(crate) struct Differences<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     terms: Terms<S>,
@@ -41,12 +41,12 @@ pub(crate) struct Differences<'a, S> {
 }
 
 impl<'a, S: Scalar> Differences<'a, S> {
-    /// Buffers for a model.
+    /// Allocates the buffers for a model.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
         Self { model, terms: Terms::default(), equations: Vec::new() }
     }
 
-    /// The equations of motion at one state with `a` and `lambda` held.
+    /// Evaluates the equations of motion at one state with fixed `a` and `lambda`.
     fn evaluate(&mut self, state: &[S], a: &[S], multipliers: &[S]) -> Result<(), MechanicsError> {
         let (n, terms) = (a.len(), &mut self.terms);
         self.model.terms(&state[..n], &state[n..], Request::ACCELERATION.without_solution(), terms)?;

@@ -6,7 +6,7 @@ use crate::scalar::{Real, Scalar, update};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-/// The derivatives of a model without the force, and those of the force.
+/// Returns the derivatives of a model without the force plus those of the force.
 pub(crate) fn with_force<'a, S: Scalar>(
     n: usize,
     model: Box<dyn Slopes<S> + 'a>,
@@ -36,7 +36,7 @@ impl<S: Scalar> Slopes<S> for Sum<'_, S> {
     }
 }
 
-/// A force by its Jacobian.
+/// The derivatives of a force from its Jacobian.
 struct ForceSlopes<'a, S> {
     n: usize,
     force: &'a dyn GeneralizedForce<S>,

@@ -1,4 +1,4 @@
-//! How the accelerations of a model change with its state, with forces on it, and with its parameters.
+//! Derivatives of the accelerations of a model by its state, by forces on it, and by its parameters.
 
 mod differences;
 mod forces;
@@ -32,23 +32,23 @@ pub struct Held<'a, S> {
     pub a: &'a [S],
     /// Number of constraints `m`.
     pub constraints: usize,
-    /// Their multipliers, `(batch, m)`.
+    /// Multipliers of the constraints, `(batch, m)`.
     pub multipliers: &'a [S],
 }
 
-/// Sums of a [`Slopes::add_products`].
+/// Accumulators for [`Slopes::add_products`].
 #[derive(Debug)]
 pub struct Products<'a, S> {
-    /// By the coordinates, `(batch, n)`.
+    /// Derivatives by the coordinates, `(batch, n)`.
     pub by_q: &'a mut [S],
-    /// By the velocities, `(batch, n)`.
+    /// Derivatives by the velocities, `(batch, n)`.
     pub by_v: &'a mut [S],
-    /// By the parameters, summed over the batch; unchanged by a part without parameters.
+    /// Derivatives by the parameters, summed over the batch; a part without parameters does not change them.
     pub by_parameters: &'a mut Vec<S>,
 }
 
 impl<S: Scalar> Products<'_, S> {
-    /// Adds `weights`, `(batch, n + m)`, times matrices `(batch, n + m, 2 n)`.
+    /// Adds the products of `weights`, `(batch, n + m)`, with matrices `(batch, n + m, 2 n)`.
     fn add(&mut self, held: &Held<'_, S>, matrices: &[S], weights: &[S]) {
         let (n, rows) = (held.n, held.n + held.constraints);
         for (k, (row, &weight)) in matrices.chunks_exact((2 * n).max(1)).zip(weights).enumerate() {
@@ -58,7 +58,7 @@ impl<S: Scalar> Products<'_, S> {
         }
     }
 
-    /// Adds the derivatives by the parameters of a state.
+    /// Adds the derivatives by the parameters at one state.
     pub(crate) fn add_parameters(&mut self, by_parameters: &[S]) {
         if self.by_parameters.is_empty() {
             self.by_parameters.resize(by_parameters.len(), <S as Real>::zero());
@@ -67,8 +67,8 @@ impl<S: Scalar> Products<'_, S> {
     }
 }
 
-/// Derivatives of the equations of motion `f = [g - c + Q - M a + A^T lambda; -(A a + gamma)]`, `n + m` of them, by the state and the
-/// parameters, with `a` and `lambda` held. Buffers are reused.
+/// Derivatives of the `n + m` equations of motion `f = [g - c + Q - M a + A^T lambda; -(A a + gamma)]` by the state and the parameters, at
+/// fixed `a` and `lambda`. Buffers are reused.
 pub trait Slopes<S: Scalar> {
     /// Adds `df/d(q, v)` to matrices `(batch, n + m, 2 n)`.
     ///
@@ -76,7 +76,7 @@ pub trait Slopes<S: Scalar> {
     /// Those of [`EulerLagrange::terms`].
     fn add_matrices(&mut self, held: &Held<'_, S>, matrices: &mut [S]) -> Result<(), MechanicsError>;
 
-    /// Adds the derivatives of `weights.f`, weights `(batch, n + m)`; by default through the matrices.
+    /// Adds the derivatives of `weights.f`, with weights `(batch, n + m)`; the default implementation computes the matrices.
     ///
     /// # Errors
     /// Those of [`EulerLagrange::terms`].
@@ -93,7 +93,7 @@ pub trait Slopes<S: Scalar> {
     }
 }
 
-/// The accelerations of a batch of states and their derivatives; matrices are row-major, a row for each acceleration.
+/// The accelerations of a batch of states and their derivatives; matrices are row-major, with one row for each acceleration.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Linearization<S> {
     /// `a`, `(batch, n)`.
@@ -106,26 +106,26 @@ pub struct Linearization<S> {
     pub by_force: Vec<S>,
 }
 
-/// Derivatives of `w.a` of a batch of states, weights `w` `(batch, n)`.
+/// Derivatives of `w.a` for a batch of states, with weights `w`, `(batch, n)`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gradient<S> {
-    /// By the coordinates, `(batch, n)`.
+    /// Derivatives by the coordinates, `(batch, n)`.
     pub by_q: Vec<S>,
-    /// By the velocities, `(batch, n)`.
+    /// Derivatives by the velocities, `(batch, n)`.
     pub by_v: Vec<S>,
-    /// By a generalized force, `(batch, n)`.
+    /// Derivatives by a generalized force, `(batch, n)`.
     pub by_force: Vec<S>,
-    /// By the parameters of the Lagrangian, summed over the batch; empty for a model without parameters, and for your own types. A system
-    /// from a file has one list of parameters for its Lagrangian, its friction and its constraints; parameters of other forces and
-    /// constraints are held fixed.
+    /// Derivatives by the parameters of the Lagrangian, summed over the batch; empty for a model without parameters, and for your own
+    /// types. A system from a file has one list of parameters for its Lagrangian, its friction and its constraints; parameters of other
+    /// forces and constraints are held fixed.
     pub by_parameters: Vec<S>,
 }
 
-/// Linearizes a model about states, with its own buffers, for an implicit integrator, a filter, or a controller.
+/// Linearizes a model about given states with preallocated buffers, for an implicit integrator, a filter, or a controller.
 ///
 /// With `f = g - c + Q` the motion is `M a = f`, so that `da/dx = M^-1 (df/dx - dM/dx a)`: the inverse times the derivatives of the
-/// equations at fixed accelerations. Those are exact. For a Lagrangian that is written down they come from a program of its third
-/// derivatives, recorded on first use without zeros; for `[[links]]` from their recursion; for a network from the sweeps of its training.
+/// equations at fixed accelerations. These derivatives are exact. For a Lagrangian written by hand they come from a sparse program of its
+/// third derivatives, recorded on first use; for `[[links]]` from a recursion; for a network from the same sweeps as in its training.
 /// Forces given as a closure, and your own types that implement [`EulerLagrange`], are differentiated numerically, with errors of about
 /// `eps^(4/5)`.
 ///
@@ -145,14 +145,14 @@ pub struct Gradient<S> {
 /// ```
 pub struct Linearizer<'a, S: Scalar> {
     model: &'a dyn EulerLagrange<S>,
-    /// The program of a small model.
+    /// The single program for a small model.
     whole: Option<(Solved<'a, S>, Linearized<S>, Replay<S>)>,
     slopes: Option<Box<dyn Slopes<S> + 'a>>,
     terms: Terms<S>,
     bordered: Bordered<S>,
-    /// Derivatives of the equations, or weights.
+    /// Right sides: derivatives of the equations, or weights.
     right: Vec<S>,
-    /// The solution: inverses, or weights.
+    /// The solution: inverse matrices, or weights.
     solution: Vec<S>,
     workspace: Workspace<S>,
     linearization: Linearization<S>,
@@ -160,7 +160,7 @@ pub struct Linearizer<'a, S: Scalar> {
 }
 
 impl<'a, S: Scalar> Linearizer<'a, S> {
-    /// Buffers for a model.
+    /// Allocates the buffers for a model.
     pub fn new(model: &'a dyn EulerLagrange<S>) -> Self {
         Self {
             model,
@@ -180,7 +180,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         }
     }
 
-    /// Accelerations and their derivatives at states `q`, `v`, `(batch, n)` in physical units.
+    /// Computes accelerations and their derivatives at states `q`, `v`, `(batch, n)` in physical units.
     ///
     /// # Errors
     /// Those of [`EulerLagrange::terms`], for the first state that fails.
@@ -188,15 +188,15 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         self.under(q, v, None)
     }
 
-    /// The result of the last call.
+    /// Returns the result of the last call.
     pub(super) fn last(&self) -> &Linearization<S> {
         &self.linearization
     }
 
-    /// As [`at`](Self::at), under external generalized forces, `(batch, n)`, if there are any.
+    /// Does the same as [`at`](Self::at) with optional external generalized forces, `(batch, n)`.
     ///
     /// # Errors
-    /// Those of [`EulerLagrange::terms`]; a wrong length of the forces.
+    /// Those of [`EulerLagrange::terms`]; also if the forces have the wrong length.
     pub fn under(&mut self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<&Linearization<S>, MechanicsError> {
         let n = self.model.coordinates();
         if force.is_none()
@@ -240,11 +240,11 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         Ok(&self.linearization)
     }
 
-    /// Derivatives of `w.a` by all arguments of the accelerations: the product of `w`, `(batch, n)`, from the left with the linearization,
-    /// by one sweep instead of `n`.
+    /// Computes the derivatives of `w.a` by all arguments of the accelerations, that is, the product of `w`, `(batch, n)`, with the
+    /// linearization from the left. This takes one sweep instead of `n`.
     ///
     /// # Errors
-    /// Those of [`EulerLagrange::terms`]; a wrong length of `w`.
+    /// Those of [`EulerLagrange::terms`]; also if `w` has the wrong length.
     pub fn gradient(&mut self, q: &[S], v: &[S], w: &[S]) -> Result<&Gradient<S>, MechanicsError> {
         if w.len() != q.len() {
             return Err(MechanicsError::Shape { what: "weights", expected: q.len(), found: w.len() });
@@ -256,7 +256,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
             self.right.extend_from_slice(w);
             self.right.resize(self.right.len() + m, zero);
         }
-        // The bordered matrix `[M A^T; A 0]` is its own transpose, and `-lambda` its second unknown.
+        // The bordered matrix `[M A^T; A 0]` is symmetric, and its second unknown is `-lambda`.
         self.solution.resize(self.right.len(), zero);
         let (right, solution, workspace) = (&self.right, &mut self.solution, &mut self.workspace);
         let solved = match m {
@@ -278,7 +278,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         Ok(&self.gradient)
     }
 
-    /// The terms of the states, and the matrices of their motion; the number of constraints.
+    /// Computes the terms of the states and the matrices of the equations of motion; returns the number of constraints.
     fn solve_motion(&mut self, q: &[S], v: &[S], force: Option<&[S]>) -> Result<usize, MechanicsError> {
         self.model.terms(q, v, Request::ACCELERATION, &mut self.terms)?;
         let (n, m) = (self.model.coordinates(), self.terms.constraints);
@@ -291,7 +291,7 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
         Ok(m)
     }
 
-    /// The first failure of the workspace.
+    /// Returns the first failure of the workspace.
     fn check(&self, solved: bool) -> Result<(), MechanicsError> {
         match self.workspace.failures().first() {
             Some(&(row, failure)) if !solved => Err(MechanicsError::unsolved(row, failure)),
@@ -300,12 +300,12 @@ impl<'a, S: Scalar> Linearizer<'a, S> {
     }
 }
 
-/// The derivatives of the equations of motion, by differences if a model does not provide them.
+/// Returns the derivatives of the equations of motion, computed with differences if the model does not provide them.
 fn slopes<'a, S: Scalar>(model: &'a dyn EulerLagrange<S>) -> Box<dyn Slopes<S> + 'a> {
     model.slopes().unwrap_or_else(|| Box::new(Differences::new(model)))
 }
 
-/// States with their accelerations.
+/// Collects states and their accelerations.
 fn held<'a, S>(n: usize, (q, v): (&'a [S], &'a [S]), terms: &'a Terms<S>) -> Held<'a, S> {
     Held { n, state: (q, v), a: &terms.acceleration, constraints: terms.constraints, multipliers: &terms.multipliers }
 }

@@ -11,9 +11,9 @@ use alloc::vec::Vec;
 /// Programs of one part of the equations.
 #[derive(Clone, Debug)]
 pub(crate) struct SlopePrograms<S> {
-    /// Numbers of coordinates, and of constraints that the part knows.
+    /// Numbers of coordinates and of constraints in this part.
     size: (usize, usize),
-    /// Nonzero elements of `df/d(q, v)` and their positions: row and column of `2 n`.
+    /// Nonzero elements of `df/d(q, v)` and their positions: row, and column among `2 n`.
     matrices: Arc<Program<S>>,
     places: Arc<[(usize, usize)]>,
     /// Derivatives of `weights.f` by the state and the parameters.
@@ -21,7 +21,7 @@ pub(crate) struct SlopePrograms<S> {
 }
 
 impl<S: Scalar> SlopePrograms<S> {
-    /// Programs of a part with this rate; `None` if they are too large.
+    /// Records the programs of a part with this rate; returns `None` if they are too large.
     pub(crate) fn of(rate: &Rate<S>) -> Option<Self> {
         let ((n, m), k) = (rate.size, rate.parameters());
         let mut places = Vec::new();
@@ -35,7 +35,7 @@ impl<S: Scalar> SlopePrograms<S> {
             }
             Some(outputs)
         });
-        // weights.f, of the inputs q, v, a, lambda, weights, parameters.
+        // weights.f as a function of q, v, a, lambda, weights, parameters.
         let state = 3 * n + m;
         let weighted = Program::<S>::record_within(ROWS, (state + n + m + k, 0), |x, _| {
             let (x, weights) = x.split_at(state);
@@ -51,14 +51,14 @@ impl<S: Scalar> SlopePrograms<S> {
         Some(Self { size: (n, m), matrices, places: places.into(), products })
     }
 
-    /// Operations of a state.
+    /// Returns the number of operations per state.
     #[cfg(test)]
     pub(crate) fn operations(&self) -> usize {
         self.matrices.lane_operations()
     }
 }
 
-/// [`Slopes`] of a part by its programs.
+/// Evaluates [`Slopes`] of a part with its programs.
 pub(crate) struct ProgramSlopes<S> {
     programs: SlopePrograms<S>,
     matrices: Replay<S>,
@@ -70,7 +70,7 @@ pub(crate) struct ProgramSlopes<S> {
 }
 
 impl<S: Scalar> ProgramSlopes<S> {
-    /// Buffers for programs; `parameters` are those of the recorded functions.
+    /// Allocates buffers for programs; `parameters` are those of the recorded functions.
     pub fn new(programs: SlopePrograms<S>, parameters: &[S]) -> Self {
         Self {
             matrices: Replay::new(Arc::clone(&programs.matrices)),

@@ -1,20 +1,20 @@
-//! The rate along the motion, from whose derivatives all equations of motion follow.
+//! The rate along the motion: its derivatives give all equations of motion.
 //!
-//! For a Lagrangian it is `w.dL/dq + a.dL/dv`, `w = v`. With a dissipation function `D`, with the rows `A` of constraints, their
-//! multipliers `lambda` and weights `y` of their second derivatives,
+//! For a Lagrangian the rate is `w.dL/dq + a.dL/dv`, with `w = v`. Including a dissipation function `D`, the rows `A` of constraints, their
+//! multipliers `lambda` and weights `y` of their second derivatives, it is
 //!
 //! ```text
 //! R(q, v, w, a, lambda, y) = w.dL/dq + a.dL/dv + D + lambda.(A w) - y.(A a + gamma)
 //! ```
 //!
-//! contains the equations
+//! which contains the equations
 //!
 //! ```text
 //! g - c - M a - dD/dv + A^T lambda = dR/dw - dR/dv,    -(A a + gamma) = dR/dy.
 //! ```
 //!
-//! All their derivatives are therefore second derivatives of `R`. The Lagrangian, the friction and the constraints have rates of their own,
-//! which add up.
+//! All their derivatives are therefore second derivatives of `R`. The Lagrangian, the friction and the constraints each have a rate, and
+//! the rates add up.
 
 use crate::forward::{Dual, HyperDual};
 use crate::lagrangian::Constraints;
@@ -28,37 +28,37 @@ use alloc::vec::Vec;
 #[derive(Debug)]
 pub struct Rate<S> {
     program: Program<S>,
-    /// Numbers of coordinates, and of constraints that the part knows.
+    /// Numbers of coordinates and of constraints in this part.
     pub size: (usize, usize),
     /// `true` if `d2R/dw dq` is known to be symmetric.
     symmetric: bool,
 }
 
-/// Kind of an input of a rate.
+/// The kind of an input of a rate.
 enum Input {
     Position(usize),
     Velocity(usize),
-    /// Of `w`.
+    /// A component of `w`.
     Speed(usize),
     Acceleration,
     Multiplier,
-    /// Of `y`.
+    /// A component of `y`.
     Weight(usize),
     Parameter(usize),
 }
 
-/// Rows by their columns; missing elements are zero.
+/// Sparse rows by column; missing elements are zero.
 pub(crate) type SparseRows<R> = Vec<BTreeMap<usize, R>>;
 
 impl<S: Scalar> Rate<S> {
-    /// The rate of the Lagrangian with this value.
+    /// Records the rate of the Lagrangian with this value.
     ///
     /// # Errors
-    /// [`TapeError::Full`], here and below.
+    /// [`TapeError::Full`], as for the functions below.
     pub fn of_lagrangian(value: &Program<S>) -> Result<Self, TapeError> {
         let (n, k) = (value.inputs() / 2, value.parameters());
         let program = Program::record_within(ROWS, (4 * n + k, 0), |x, _| {
-            // The coordinates move along `w`, the velocities along `a`.
+            // The coordinates move along `w`, and the velocities along `a`.
             let moving = x[..2 * n].iter().zip(&x[2 * n..]).map(|(&value, &tangent)| Dual { value, tangent });
             let parameters: Vec<_> = x[4 * n..].iter().map(|&p| Dual::lift(p)).collect();
             Some(vec![value.interpret(&moving.collect::<Vec<_>>(), &parameters).ok()?[0].tangent])
@@ -66,7 +66,7 @@ impl<S: Scalar> Rate<S> {
         Ok(Self { program: program?, size: (n, 0), symmetric: true })
     }
 
-    /// The rate of the dissipation function with this value.
+    /// Records the rate of the dissipation function with this value.
     pub fn of_dissipation(value: &Program<S>) -> Result<Self, TapeError> {
         let (n, k) = (value.inputs() / 2, value.parameters());
         let program =
@@ -74,7 +74,7 @@ impl<S: Scalar> Rate<S> {
         Ok(Self { program: program?, size: (n, 0), symmetric: true })
     }
 
-    /// The rate of the constraint rows with these indices; `shared` if their parameters are the Lagrangian's.
+    /// Records the rate of the constraint rows with these indices; `shared` if they take the parameters of the Lagrangian.
     pub fn of_constraints(
         constraints: &impl Constraints,
         (all, kept): (usize, &[usize]),
@@ -91,8 +91,8 @@ impl<S: Scalar> Rate<S> {
             let (zero, at) = (Tracer::zero(), |field: usize, i: usize| x[field * n + i]);
             let p: Vec<_> = own.iter().map(|&p| Dual::lift(p)).collect();
             let mut sum = zero;
-            // The row of a function is its gradient by the coordinates; that of a row linear in the velocities is the gradient by the
-            // velocities.
+            // The row of a function is its gradient by the coordinates; that of a constraint linear in the velocities is its gradient by
+            // the velocities.
             for holonomic in [true, false] {
                 let along = |field: usize, moves: bool| -> Vec<_> {
                     let tangent = |i: usize| if moves { at(2, i) } else { zero };
@@ -121,7 +121,7 @@ impl<S: Scalar> Rate<S> {
         Ok(Self { program: program?, size: (n, m), symmetric })
     }
 
-    /// The kind of this input.
+    /// Returns the kind of this input.
     fn input(&self, k: usize) -> Input {
         let (n, m) = self.size;
         match k.checked_sub(4 * n) {
@@ -135,19 +135,19 @@ impl<S: Scalar> Rate<S> {
         }
     }
 
-    /// Number of parameters.
+    /// Returns the number of parameters.
     pub fn parameters(&self) -> usize {
         let (n, m) = self.size;
         self.program.inputs() - 4 * n - 2 * m
     }
 
-    /// The inputs at a state that moves: `x` holds `q`, `v`, `a`, `lambda`, and `y` is zero.
+    /// Returns the inputs for actual motion: `x` contains `q`, `v`, `a`, `lambda`, `w` equals `v`, and `y` is zero.
     fn at_motion<R: Real>(&self, x: &[R], parameters: &[R]) -> Vec<R> {
         let (n, m) = self.size;
         [&x[..2 * n], &x[n..3 * n + m], &vec![R::zero(); m], parameters].concat()
     }
 
-    /// The `n + m` equations `f` at `x`, which holds `q`, `v`, `a`, `lambda`.
+    /// Returns the `n + m` equations `f` at `x`, which contains `q`, `v`, `a`, `lambda`.
     pub fn equations<R: Real>(&self, x: &[R], parameters: &[R]) -> Option<Vec<R>> {
         let (n, m) = self.size;
         let by = self.program.derivatives(&self.at_motion(x, parameters), &[], None)?.first;
@@ -155,11 +155,11 @@ impl<S: Scalar> Rate<S> {
         Some(of_motion.chain(by[4 * n + m..4 * n + 2 * m].iter().copied()).collect())
     }
 
-    /// Nonzero elements of the rows `A` of constraints, by increasing column, and their drift `gamma`, at a state `q`, `v`; for constraints
-    /// whose parameters are constants.
+    /// Returns the nonzero elements of the constraint rows `A`, by increasing column, and their drift `gamma`, at a state `q`, `v`; for
+    /// constraints whose parameters are constants.
     pub fn rows<R: Real>(&self, state: &[R]) -> Option<(Lists<R>, Vec<R>)> {
         let (n, m) = self.size;
-        // If only `w` and `lambda` vary, just `A` remains, whatever their values.
+        // The derivatives by `w` and `lambda` are the elements of `A`, whatever the values of `w` and `lambda`.
         let inputs = [state, &vec![R::zero(); 2 * n + 2 * m]].concat();
         let seed = |k: usize| match self.input(k) {
             Input::Speed(i) => vec![(i as u32, R::one())],
@@ -177,17 +177,17 @@ impl<S: Scalar> Rate<S> {
         Some((matrix, found.first[4 * n + m..].iter().map(|&by| -by).collect()))
     }
 
-    /// The nonzero elements of `df/d(q, v)`, `n + m` rows and `2 n` columns, followed by the derivatives by chosen parameters.
+    /// Returns the nonzero elements of `df/d(q, v)`, `n + m` rows and `2 n` columns, followed by the derivatives by chosen parameters.
     pub fn slopes<R: Real>(&self, x: &[R], parameters: &[R], chosen: &[usize]) -> Option<SparseRows<R>> {
         let ((n, m), count) = (self.size, self.program.inputs());
-        // Velocities move along the first directions, coordinates along the next, parameters along the others.
+        // The first directions move the velocities, the next ones the coordinates, and the others the parameters.
         let direction = |k: usize| match self.input(k) {
             Input::Velocity(i) => Some(i),
             Input::Position(i) => Some(n + i),
             Input::Parameter(k) => chosen.iter().position(|&of| of == k).map(|place| 2 * n + place),
             _ => None,
         };
-        // The last direction of an input: of symmetric blocks the lower triangle is enough.
+        // The last direction for an input: symmetric blocks need only their lower triangle.
         let last = |k: usize| match self.input(k) {
             Input::Velocity(i) => Some(i),
             Input::Position(_) => Some(n - 1),
@@ -208,7 +208,7 @@ impl<S: Scalar> Rate<S> {
             for (direction, x) in elements {
                 let (direction, j) = (direction as usize, direction as usize % n);
                 let by_velocity = direction < n;
-                // The equations are dR/dw - dR/dv and dR/dy, and w moves with v.
+                // The equations are dR/dw - dR/dv and dR/dy, where w equals v.
                 match self.input(k) {
                     Input::Velocity(i) if direction >= 2 * n => put(i, direction, -x),
                     Input::Speed(i) if direction >= 2 * n => put(i, direction, x),

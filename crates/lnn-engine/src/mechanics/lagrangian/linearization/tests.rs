@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 type Given = Vec<(String, String)>;
 
-/// Builds the same model with parameters of another number type, one of them changed.
+/// Builds the same model with another number type and one changed parameter.
 trait Family {
     fn model<S: Scalar>(&self, changed: Option<(usize, S)>) -> Box<dyn EulerLagrange<S>>;
     fn parameters(&self) -> usize;
@@ -30,7 +30,7 @@ impl Family for Of<'_> {
     }
 }
 
-/// Derivative of the accelerations by `x` moved by a small number, exact to 20 digits.
+/// Derivative of the accelerations by a small displacement of `x`, exact to 20 digits.
 fn slope(f: impl Fn(Dd) -> Vec<Dd>) -> Vec<f64> {
     let h = Dd::of_f64(1e-9);
     let (ahead, behind) = (f(h), f(-h));
@@ -104,7 +104,7 @@ fn systems_under_constraints_are_linearized_exactly() {
             continue;
         }
         let bounds = system.validation(n);
-        // The first of some states from which the constraints are reached.
+        // The first of some states that can be projected onto the constraints.
         let allowed = (0..50).find_map(|k| {
             let within = |sides: &[(f64, f64)], by: f64| -> Vec<f64> {
                 let part = |i: usize| (by * (k + 1) as f64 * (i + 1) as f64).fract();
@@ -133,7 +133,7 @@ fn friction_shares_its_parameters_with_the_lagrangian_also_where_it_vanishes() {
     }
 }
 
-/// Two masses that a spring joins, under a force `-v^3` given in three ways.
+/// Two masses joined by a spring, under a force `-v^3` that is given in three ways.
 struct Pair;
 
 impl Lagrangian for Pair {
@@ -190,7 +190,7 @@ fn functions_given_as_values_are_differentiated_numerically() {
     }
 }
 
-/// A Lagrangian with its sign turned.
+/// A Lagrangian with reversed sign.
 struct Turned;
 
 impl Lagrangian for Turned {

@@ -1,5 +1,5 @@
-//! The linearization of a small model as one program: its accelerations, the inverse of its mass matrix, and their product with the derivatives
-//! of the equations of motion.
+//! The linearization of a small model as one program: its accelerations, the inverse of its mass matrix, and the product of the inverse
+//! with the derivatives of the equations of motion.
 
 use super::Linearization;
 use crate::lagrangian::accelerations::{RecordMotion, are_safe};
@@ -20,7 +20,7 @@ pub(crate) struct Linearized<S> {
 }
 
 impl<S: Scalar> Linearized<S> {
-    /// Records the linearization of `n` coordinates; `None` if its parts are faster, or not known.
+    /// Records the linearization of `n` coordinates; returns `None` if separate programs are faster, or if it cannot be recorded.
     pub fn record(motion: &dyn RecordMotion<S>, n: usize, parameters: &[S]) -> Option<Self> {
         if n > motion.linearized_up_to() {
             return None;
@@ -29,7 +29,7 @@ impl<S: Scalar> Linearized<S> {
         let program = Program::record_within(ROWS, (2 * n, parameters.len()), |x, p| {
             let balance = motion.record(x, p)?;
             let eliminated = Eliminated::of(n, balance.lower, usize::MAX)?;
-            // The multipliers follow the accelerations, with reversed sign.
+            // The multipliers follow the accelerations with reversed sign.
             let (mut acceleration, inverse) = (eliminated.solve(balance.right), eliminated.inverse());
             acceleration[n..].iter_mut().for_each(|multiplier| *multiplier = -*multiplier);
             let slopes = motion.record_slopes(&[x, &acceleration].concat(), p)?;
@@ -52,12 +52,12 @@ impl<S: Scalar> Linearized<S> {
         Some(Self { program: Arc::new(program.ok()?), n, parameters: parameters.to_vec(), pivots })
     }
 
-    /// Buffers of its evaluation.
+    /// Returns a replay with buffers for the program.
     pub fn replay(&self) -> Replay<S> {
         Replay::new(Arc::clone(&self.program))
     }
 
-    /// Fills a linearization; `false` if a state needs a second look.
+    /// Fills a linearization; returns `false` if a state needs the general solver.
     pub fn evaluate(
         &self,
         replay: &mut Replay<S>,

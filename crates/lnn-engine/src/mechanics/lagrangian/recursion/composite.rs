@@ -1,4 +1,4 @@
-//! The mass matrix by composite bodies: a joint moves the links behind it as one rigid body.
+//! The mass matrix by the composite rigid body method: a joint moves all links beyond it as one rigid body.
 
 use super::vector::{add, outer, scaled, sum, symmetric};
 use super::{Body, Chain, Frame, Load};
@@ -6,7 +6,7 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 
 impl<R: Real> Body<R> {
-    /// The body in and about the previous frame.
+    /// Returns the body in and about the previous frame.
     fn seen(&self, frame: &Frame<R>) -> Self {
         let turned = frame.outward::<true>(self.first);
         let first = add(turned, scaled(self.mass, frame.place));
@@ -17,7 +17,7 @@ impl<R: Real> Body<R> {
         let second = sum(&self.second, &other.second);
         Self { mass: self.mass + other.mass, first: add(self.first, other.first), second }
     }
-    /// Force and moment that accelerate it from rest along or about the axis by 1.
+    /// Returns the force and moment for a unit acceleration from rest along or about the axis.
     fn pushed(&self, slides: bool) -> Load<R> {
         let ([x, y, _], j, zero) = (self.first, &self.second, R::zero());
         if slides {
@@ -28,7 +28,7 @@ impl<R: Real> Body<R> {
 }
 
 impl<R: Real> Chain<R> {
-    /// The lower triangle of the mass matrix, row by row.
+    /// Computes the lower triangle of the mass matrix, row by row.
     pub(super) fn mass_matrix(&self, q: &[R]) -> Vec<Vec<R>> {
         let own = self.of_joints(q);
         let joints = own.as_deref().unwrap_or(q);
@@ -58,7 +58,7 @@ impl<R: Real> Chain<R> {
         let Some(drives) = &self.drives else { return rows[i][j] = element };
         let ((a, first), (b, second)) = (drives[i], drives[j]);
         let element = first * second * element;
-        // The matrix of the joints is symmetric: of two joints of one coordinate the element counts twice.
+        // The matrix of the joints is symmetric: if two different joints have the same coordinate, their element counts twice.
         rows[a.max(b)][a.min(b)] += if i != j && a == b { R::two() * element } else { element };
     }
 }

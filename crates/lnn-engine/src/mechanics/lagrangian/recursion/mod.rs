@@ -1,4 +1,4 @@
-//! Dynamics of a tree of rigid links by recursion over its links, in a number of operations that grows with their number.
+//! Recursive dynamics of a tree of rigid links; the number of operations grows linearly with the number of links.
 //!
 //! Vectors are given in the frame of a joint, whose `z` is its axis. From the frame of the link that carries it, `r' = R r + p` with `R =
 //! Rot_z(gamma) Rot_x(alpha) Rot_z(theta)`; Denavit-Hartenberg rows have `gamma = 0` and `p = (a, -d sin alpha, d cos alpha)`, and a chain
@@ -10,7 +10,7 @@
 //! `f = m s + B h`,  `n = h x s + sum_k (row k of B J) as a skew matrix`.
 //!
 //! Source: R. Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapters 5 to 7; W. Khalil and E. Dombre, "Modeling, Identification and
-//! Control of Robots", 2002, for the modified convention and for the constants that have no effect of their own.
+//! Control of Robots", 2002, for the modified convention and for the grouping of constants without separate effect.
 
 mod composite;
 mod model;
@@ -25,10 +25,10 @@ use alloc::vec::Vec;
 pub use vector::{Matrix, Vector, applied, cross, product, transposed};
 use vector::{add, scaled};
 
-/// A tree of links whatever its constants are.
+/// The geometry of a tree of links, independent of the values of its constants.
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
-    /// Links, every one after the link that carries it.
+    /// Links; each one comes after the link that carries it.
     pub rows: Vec<Row>,
     /// Number of coordinates.
     pub coordinates: usize,
@@ -41,7 +41,7 @@ pub(super) struct Shape {
 /// A link and the joint that moves it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
-    /// Where its joint is.
+    /// The geometry of its joint.
     pub joint: Joint,
     /// Indices of the link's ten constants among the parameters: `m`, `h`, `Ixx`, `Ixy`, `Ixz`, `Iyy`, `Iyz`, `Izz`.
     pub inertia: [usize; 10],
@@ -51,20 +51,20 @@ pub(super) struct Row {
     pub friction: Option<[usize; 2]>,
 }
 
-/// A joint: the frame in which it moves a link, seen from the frame of the joint of the link that carries it.
+/// A joint: the frame in which it moves a link, relative to the joint frame of the link that carries it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Joint {
     /// Index of the link that carries it; `None` for the base.
     pub parent: Option<usize>,
-    /// Sine and cosine of the turn `gamma` about `z` before the twist.
+    /// Sine and cosine of the rotation `gamma` about `z` before the twist.
     pub bend: [f64; 2],
     /// Sine and cosine of the twist.
     pub twist: [f64; 2],
-    /// Angle about the joint in rad; what a turning joint adds to.
+    /// Angle about the joint in rad; a revolute joint adds its coordinate.
     pub theta: f64,
-    /// The origin in m; a sliding joint moves it along its axis.
+    /// The origin in m; a prismatic joint moves it along its axis.
     pub place: [f64; 3],
-    /// `true` if the joint slides.
+    /// `true` if the joint is prismatic.
     pub slides: bool,
     /// Index of the coordinate that moves it, and its motion per unit of that coordinate.
     pub drive: (usize, f64),
@@ -73,7 +73,7 @@ pub(super) struct Joint {
 }
 
 impl Joint {
-    /// The axis in the frame of the joint before.
+    /// Returns the axis in the frame of the previous joint.
     pub fn axis(&self) -> Vector<f64> {
         let ([sb, cb], [sa, ca]) = (self.bend, self.twist);
         [sb * sa, -(cb * sa), ca]
@@ -89,21 +89,21 @@ struct Body<R> {
 }
 
 impl<R: Real> Body<R> {
-    /// A body from the ten constants of a link.
+    /// Converts the ten constants of a link to a body.
     fn of([m, hx, hy, hz, xx, xy, xz, yy, yz, zz]: [R; 10]) -> Self {
         let half = (xx + yy + zz) * R::half();
         let second = [[half - xx, -xy, -xz], [-xy, half - yy, -yz], [-xz, -yz, half - zz]];
         Self { mass: m, first: [hx, hy, hz], second }
     }
 
-    /// The body in a frame of the same origin with these axes, as columns in its own frame: `A^T h` and `A^T J A`.
+    /// Expresses the body in a frame of the same origin with these axes, as columns in its own frame: `A^T h` and `A^T J A`.
     fn along(self, axes: &Matrix<f64>) -> Self {
         let axes = transposed(*axes).map(|axis| axis.map(R::of));
         let halfway = transposed(self.second.map(|row| applied(&axes, row)));
         Self { mass: self.mass, first: applied(&axes, self.first), second: halfway.map(|row| applied(&axes, row)) }
     }
 
-    /// Adds mass `m` at a place, first moment `h` and second moment `j` along an axis through it.
+    /// Adds mass `m` at a position, first moment `h` and second moment `j` along an axis through it.
     fn add_on_axis(&mut self, [m, h, j]: [R; 3], place: Vector<R>, axis: Vector<R>) {
         self.mass += m;
         let first = add(scaled(m, place), scaled(h, axis));
@@ -117,7 +117,7 @@ impl<R: Real> Body<R> {
     }
 }
 
-/// A link with its joint, all constants known.
+/// A link with its joint and the values of all constants.
 #[derive(Clone, Copy, Debug)]
 struct Link<R> {
     parent: Option<usize>,
@@ -133,12 +133,12 @@ struct Link<R> {
     dry: R,
 }
 
-/// Data of each link during a recursion.
+/// Intermediate results of each link in a recursion.
 #[derive(Debug)]
 pub(super) struct Passes<R> {
-    /// Its frame, and the forces for its own motion.
+    /// Its frame, and the load of its own motion.
     links: Vec<(Frame<R>, Load<R>)>,
-    /// Its motion, in a tree.
+    /// Its motion; only used in a tree.
     motions: Vec<Motion<R>>,
 }
 
@@ -148,23 +148,23 @@ impl<R> Default for Passes<R> {
     }
 }
 
-/// A tree of links with its constants.
+/// A tree of links with values of its constants.
 #[derive(Clone, Debug)]
 pub struct Chain<R> {
     links: Vec<Link<R>>,
-    /// `true` if a link is not carried by the previous one, or is bent.
+    /// `true` if a link is not carried by the previous one, or has a bend.
     is_tree: bool,
-    /// The coordinate of each joint and how far it moves for each unit of that, unless every joint has its own.
+    /// The coordinate of each joint and its motion per unit of that coordinate; `None` if every joint has a separate coordinate.
     drives: Option<Vec<(usize, R)>>,
     gravity: Vector<R>,
     coulomb_speed: R,
 }
 
 impl<R: Real> Chain<R> {
-    /// A shape with values of its parameters.
+    /// Combines a shape with values of its parameters.
     ///
-    /// Mass on the axis of a revolute joint also moves with the previous link: its mass, first and second moment are counted there, which
-    /// changes no joint force and saves operations.
+    /// Mass on the axis of a revolute joint also moves with the previous link. Its mass, first and second moment are assigned to that link,
+    /// which leaves joint forces unchanged and saves operations.
     pub(super) fn new(shape: &Shape, parameters: &[R]) -> Self {
         let value = |at: Option<usize>| at.map_or(R::zero(), |at| parameters[at]);
         let link = |row: &Row| {
@@ -200,12 +200,12 @@ impl<R: Real> Chain<R> {
         Self { links, is_tree, drives, gravity: shape.gravity.map(R::of), coulomb_speed: R::of(shape.coulomb_speed) }
     }
 
-    /// Coordinates, velocities or accelerations of the joints.
+    /// Converts coordinates, velocities or accelerations to those of the joints.
     fn of_joints(&self, x: &[R]) -> Option<Vec<R>> {
         self.drives.as_ref().map(|drives| drives.iter().map(|&(at, ratio)| ratio * x[at]).collect())
     }
 
-    /// Torque or force of friction on a coordinate, `-(Fv q_dot + Fc tanh(q_dot/s))` of each joint that it moves.
+    /// Computes the friction torque or force on a coordinate: the sum of `-(Fv q_dot + Fc tanh(q_dot/s))` over the joints that it moves.
     pub(super) fn friction(&self, coordinate: usize, v: R) -> R {
         let own = |joint: usize, v: R| {
             let Link { viscous, dry, .. } = self.links[joint];
@@ -228,7 +228,7 @@ impl<R: Real> Chain<R> {
         drives.iter().zip(forces).for_each(|(&(at, ratio), force)| torques[at] += ratio * force);
     }
 
-    /// The torques and forces if every joint has its own coordinate.
+    /// Computes the torques and forces if every joint has a separate coordinate.
     fn joint_forces(&self, state: [&[R]; 3], buffer: &mut Passes<R>, forces: &mut [R]) {
         buffer.links.clear();
         buffer.motions.clear();
@@ -238,7 +238,7 @@ impl<R: Real> Chain<R> {
         }
     }
 
-    /// The torques and forces for a tree or a chain; the buffer is empty.
+    /// Computes the torques and forces for a tree or a chain; the buffer must be empty.
     fn forces_in<const TREE: bool>(&self, [q, v, a]: [&[R]; 3], buffer: &mut Passes<R>, forces: &mut [R]) {
         let base = Motion::of_base(self.gravity);
         let mut motion = base;
@@ -269,7 +269,7 @@ impl<R: Real> Chain<R> {
 }
 
 impl<R: Real> Link<R> {
-    /// The frame at a value of the coordinate.
+    /// Returns the frame at a value of the coordinate.
     fn frame(&self, q: R) -> Frame<R> {
         let (angle, place) = if self.slides {
             (self.theta, add(self.place, scaled(q, self.axis)))
@@ -281,7 +281,7 @@ impl<R: Real> Link<R> {
     }
 }
 
-/// The frame of a link, seen from its carrier: sines and cosines of bend, twist and angle, and the position of its origin.
+/// The frame of a link relative to its carrier: sines and cosines of bend, twist and angle, and the position of its origin.
 #[derive(Clone, Copy, Debug)]
 struct Frame<R> {
     bend: [R; 2],
@@ -291,7 +291,7 @@ struct Frame<R> {
 }
 
 impl<R: Real> Frame<R> {
-    /// `R^T x`: a vector of the frame before in this one.
+    /// Computes `R^T x`: rotates a vector from the previous frame into this one.
     fn inward<const TREE: bool>(&self, [x, y, z]: Vector<R>) -> Vector<R> {
         let ([sb, cb], [sa, ca], [s, c]) = (self.bend, self.twist, self.turn);
         let (x, y) = if TREE { (cb * x + sb * y, cb * y - sb * x) } else { (x, y) };
@@ -299,7 +299,7 @@ impl<R: Real> Frame<R> {
         [c * x + s * y, c * y - s * x, z]
     }
 
-    /// `R x`: a vector of this frame in the previous one.
+    /// Computes `R x`: rotates a vector from this frame into the previous one.
     fn outward<const TREE: bool>(&self, [x, y, z]: Vector<R>) -> Vector<R> {
         let ([sb, cb], [sa, ca], [s, c]) = (self.bend, self.twist, self.turn);
         let (x, y) = (c * x - s * y, s * x + c * y);
@@ -307,39 +307,39 @@ impl<R: Real> Frame<R> {
         if TREE { [cb * x - sb * y, sb * x + cb * y, z] } else { [x, y, z] }
     }
 
-    /// `R m R^T`.
+    /// Computes `R m R^T`.
     fn turned(&self, m: Matrix<R>) -> Matrix<R> {
         let rows = transposed(transposed(m).map(|column| self.outward::<true>(column)));
         rows.map(|row| self.outward::<true>(row))
     }
 }
 
-/// Motion of a frame: angular velocity, its derivative, `B`, and the acceleration of the origin less that of gravity.
+/// Motion of a frame: angular velocity, its derivative, `B`, and the acceleration of the origin minus that of gravity.
 #[derive(Clone, Copy, Debug)]
 struct Motion<R> {
     turning: Vector<R>,
     spinning: Vector<R>,
-    /// Off-diagonal part of `B`, and the negative of its diagonal.
+    /// The off-diagonal part of `B`, and the negative of its diagonal.
     beside: Matrix<R>,
     inwards: Vector<R>,
     origin: Vector<R>,
 }
 
 impl<R: Real> Motion<R> {
-    /// Motion of the base, which rests: gravity acts as an upward acceleration.
+    /// Returns the motion of the base, which is at rest: gravity acts as an upward acceleration.
     fn of_base(gravity: Vector<R>) -> Self {
         let still = [R::zero(); 3];
         Self { turning: still, spinning: still, beside: [still; 3], inwards: still, origin: gravity.map(|g| -g) }
     }
 
-    /// `B r`.
+    /// Computes `B r`.
     fn swung(&self, r: Vector<R>) -> Vector<R> {
         let row =
             |i: usize, j: usize, k: usize| self.beside[i][j] * r[j] + self.beside[i][k] * r[k] - self.inwards[i] * r[i];
         [row(0, 1, 2), row(1, 2, 0), row(2, 0, 1)]
     }
 
-    /// Motion of the next link, whose joint has a velocity and an acceleration.
+    /// Returns the motion of the next link, given the velocity and acceleration of its joint.
     fn carried<const TREE: bool>(&self, frame: &Frame<R>, slides: bool, (v, a): (R, R)) -> Self {
         let origin = frame.inward::<TREE>(add(self.origin, self.swung(frame.place)));
         let [x, y, z] = frame.inward::<TREE>(self.turning);
@@ -360,7 +360,7 @@ impl<R: Real> Motion<R> {
         Self { turning, spinning, beside, inwards: [yy + zz, xx + zz, xx + yy], origin }
     }
 
-    /// Force and moment that a body takes to move so.
+    /// Computes the force and moment that this motion of a body requires.
     fn load(&self, body: &Body<R>) -> Load<R> {
         let (b, d, j) = (&self.beside, self.inwards, &body.second);
         let moment = |x: usize, y: usize, z: usize| {
@@ -381,7 +381,7 @@ struct Load<R> {
 }
 
 impl<R: Real> Load<R> {
-    /// The load in and about the previous frame.
+    /// Returns the load in and about the previous frame.
     fn seen<const TREE: bool>(&self, frame: &Frame<R>) -> Self {
         let force = frame.outward::<TREE>(self.force);
         Self { force, moment: add(frame.outward::<TREE>(self.moment), cross(frame.place, force)) }
@@ -389,7 +389,7 @@ impl<R: Real> Load<R> {
     fn with(&self, other: Self) -> Self {
         Self { force: add(self.force, other.force), moment: add(self.moment, other.moment) }
     }
-    /// Forces and moments that the joint transmits.
+    /// Returns the component of the load along or about the joint axis.
     fn along(&self, slides: bool) -> R {
         if slides { self.force[2] } else { self.moment[2] }
     }

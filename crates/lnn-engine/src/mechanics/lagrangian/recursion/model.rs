@@ -1,4 +1,4 @@
-//! A chain of links as a model: terms by its Lagrangian, accelerations and forces of single states by recursion.
+//! A chain of links as a model: terms from its Lagrangian, accelerations and forces of single states by recursion.
 
 use super::{Chain, Passes, Shape};
 use crate::forward::Dual;
@@ -14,7 +14,7 @@ use alloc::collections::BTreeMap;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// The model of a chain of links with its recursions.
+/// A model of a chain of links that uses recursive algorithms.
 pub(in crate::mechanics::lagrangian) struct Recursive<S> {
     model: Box<dyn EulerLagrange<S>>,
     chain: Chain<S>,
@@ -25,7 +25,7 @@ pub(in crate::mechanics::lagrangian) struct Recursive<S> {
 }
 
 impl<S: Scalar> Recursive<S> {
-    /// The model of a chain's Lagrangian and friction.
+    /// Combines the models of a chain's Lagrangian and friction.
     pub(in crate::mechanics::lagrangian) fn new(
         model: Box<dyn EulerLagrange<S>>,
         shape: &Arc<Shape>,
@@ -35,14 +35,14 @@ impl<S: Scalar> Recursive<S> {
         Self { model, chain, shape: Arc::clone(shape), parameters: parameters.to_vec(), solved: OnceLock::new() }
     }
 
-    /// Records the accelerations, including the elimination of the mass matrix. Constant parts are not computed.
+    /// Records the accelerations, including the elimination of the mass matrix. Constant parts are computed during recording.
     fn solve(&self) -> Option<Solved<'static, S>> {
         let recursion = Recursion { shape: Arc::clone(&self.shape), parameters: self.parameters.clone() };
         Solved::record(Arc::new(recursion), self.shape.coordinates, &[], usize::MAX)
     }
 }
 
-/// The equations of motion by recursion.
+/// The equations of motion, computed recursively.
 #[derive(Debug)]
 struct Recursion<S> {
     shape: Arc<Shape>,
@@ -63,7 +63,7 @@ impl<S: Scalar> RecordMotion<S> for Recursion<S> {
         Some(Balance { coordinates: n, lower, right })
     }
 
-    /// By forward tangents: links that carry a joint do not move with it.
+    /// Uses forward tangents, which are zero for links closer to the base than the moving joint.
     fn record_slopes<'t>(&self, x: &[Tracer<'t, S>], _: &[Tracer<'t, S>]) -> Option<SparseRows<Tracer<'t, S>>> {
         let n = self.shape.coordinates;
         let constants: Vec<_> = self.parameters.iter().map(|&value| Dual::lift(Tracer::constant(value))).collect();
@@ -90,7 +90,7 @@ impl<S: Scalar> RecordMotion<S> for Recursion<S> {
     }
 }
 
-/// A row of a lower triangle as columns and nonzero values, including its diagonal.
+/// Converts a row of a lower triangle to pairs of column and nonzero value, including its diagonal.
 fn sparse<R: Real>((k, row): (usize, Vec<R>)) -> Vec<(usize, R)> {
     row.into_iter().enumerate().filter(|(j, m)| *j == k || !m.is_exact_zero()).collect()
 }

@@ -8,17 +8,18 @@ use crate::scalar::Scalar;
 use rand::Rng;
 use std::borrow::Cow;
 
-/// Links at most.
+/// Largest number of links.
 const MOST: usize = 8;
 
-/// A system file of links, and values of its constants.
+/// A system file with links, and values of its constants.
 struct Arm {
     text: String,
     coordinates: usize,
     constants: Vec<(String, String)>,
 }
 
-/// Links that could be built, with joints of both kinds, quarter turns and other twists; a chain, or a tree some of whose joints follow others.
+/// Generates links that could be built, with joints of both kinds, quarter turns and other twists: a chain, or a tree in which some joints
+/// follow others.
 fn arm(links: usize, rng: &mut impl Rng, (friction, armature, tree): (bool, bool, bool)) -> Arm {
     let (mut rows, mut constants, mut coordinates) = (Vec::new(), Vec::new(), 0);
     for k in 1..=links {
@@ -80,14 +81,14 @@ fn torques(chain: &Chain<f64>, state: [&[f64]; 3]) -> Vec<f64> {
     torques
 }
 
-/// Largest difference over the largest number.
+/// Largest difference, relative to the largest number.
 fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let largest = |x: &mut dyn Iterator<Item = f64>| x.fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
     largest(&mut a.iter().zip(b).map(|(a, b)| a - b)) / largest(&mut b.iter().copied())
 }
 
-/// Shows arms of one to eight links with a state and accelerations.
+/// Calls `show` with arms of one to eight links, a state and accelerations.
 fn with_arms(mut show: impl FnMut(&Arm, [&[f64]; 3], &str)) {
     let mut rng = RngStream::Region.generator(17);
     for links in 1..=MOST {
@@ -138,7 +139,7 @@ fn torques_are_the_power_that_changes_the_energy() {
             let v: Vec<f64> = v.iter().zip(a).map(|(v, a)| v + a * time).collect();
             model.terms(&q, &v, Request::ACCELERATION | Request::LAGRANGIAN, &mut terms).unwrap();
             let n = q.len();
-            // Twice the kinetic energy less L.
+            // Twice the kinetic energy minus L.
             (0..n * n).map(|at| v[at / n] * terms.mass_matrix[at] * v[at % n]).sum::<f64>() - terms.lagrangian[0]
         };
         let step = 1e-4;
@@ -192,7 +193,7 @@ fn single_precision_and_wide_numbers_have_their_own_digits() {
     let (model, mut a) = (arm.configured::<f32>().build().unwrap(), [0f32; 5]);
     Accelerations::new(model.as_ref()).at(&q.map(|x| x as f32), &v.map(|x| x as f32), &mut a).unwrap();
     assert!(distance(&a.map(f64::from), &exact) < 1e-4);
-    // The rows are numbers of double precision.
+    // The geometry of the links is stored in double precision.
     let wide = arm.configured::<crate::scalar::Dd>().build().unwrap();
     assert!(wide.links().is_none());
 }

@@ -1,10 +1,10 @@
-//! Vectors and matrices of space.
+//! Vectors and matrices in three dimensions.
 
 use crate::scalar::Real;
 
 /// A vector in space.
 pub type Vector<R> = [R; 3];
-/// A matrix of vectors in space, by rows.
+/// A three-by-three matrix, by rows.
 pub type Matrix<R> = [Vector<R>; 3];
 
 pub(super) fn add<R: Real>(a: Vector<R>, b: Vector<R>) -> Vector<R> {
@@ -34,7 +34,7 @@ pub fn transposed<R: Real>(m: Matrix<R>) -> Matrix<R> {
     [0, 1, 2].map(|k| [m[0][k], m[1][k], m[2][k]])
 }
 
-/// A symmetric matrix from its upper triangle; the lower one is not computed separately.
+/// Completes a symmetric matrix from its upper triangle.
 pub(super) fn symmetric<R: Real>(m: Matrix<R>) -> Matrix<R> {
     [m[0], [m[0][1], m[1][1], m[1][2]], [m[0][2], m[1][2], m[2][2]]]
 }

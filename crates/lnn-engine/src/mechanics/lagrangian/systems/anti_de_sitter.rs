@@ -10,11 +10,11 @@ use crate::scalar::Real;
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
 
-/// `Lagrangian = (L/z)^2 (-t'^2 + x'^2 + y'^2 + z'^2) / 2` over `(t, z)`, `(t, x, z)` or `(t, x, y, z)`, `L` the radius.
+/// `Lagrangian = (L/z)^2 (-t'^2 + x'^2 + y'^2 + z'^2) / 2` over `(t, z)`, `(t, x, z)` or `(t, x, y, z)`, where `L` is the radius.
 ///
-/// `' = d/dtau`, `tau` the proper time; geometric units, `c = 1`: all coordinates, `tau` and `L` in metres. The
-/// geodesic equations are those of Hamzaogullari and Ozakin's appendix; the Euler-Lagrange equation of `z` confirms all
-/// signs printed there.
+/// Here `' = d/dtau` with the proper time `tau`, in geometric units with `c = 1`: all coordinates, `tau` and `L` are in metres. The
+/// geodesic equations are those of Hamzaogullari and Ozakin's appendix; the Euler-Lagrange equation of `z` confirms all signs printed
+/// there.
 #[derive(Clone, Copy, Debug)]
 pub struct AdsGeodesic {
     /// Number of coordinates, 2 to 4.
@@ -23,7 +23,7 @@ pub struct AdsGeodesic {
 
 static PARAMETERS: [Parameter; 1] = [length("L")];
 
-/// The same bounds as the paper's for every dimension: `t`, the coordinates between, `z`.
+/// The bounds of the paper, the same for every dimension: for `t`, the coordinates in between, and `z`.
 fn bounds(n: usize, t: (f64, f64), x: (f64, f64), z: (f64, f64), x_dot: (f64, f64), z_dot: (f64, f64)) -> Bounds {
     let list = |first, middle, last| {
         let mut list = vec![middle; n];
@@ -67,7 +67,7 @@ pub const fn system(
             dt: 0.01,
         }),
         domain: Some(|_, q| if q.last().is_some_and(|&z| z > 0.0) { Ok(()) } else { Err("z must be positive") }),
-        // With x there is a plane in space, otherwise one of space and time.
+        // With x the plane is in space, otherwise it is one of space and time.
         plane: Some(Plane {
             labels: [if n == 2 { "t [m]" } else { "x [m]" }, "z [m]"],
             point: |_, q| (q[usize::from(q.len() > 2)], q[q.len() - 1]),
@@ -82,7 +82,7 @@ pub const fn system(
             },
         }),
         learning: LearningAdvice {
-            // z = z_0 / cos(tau) from rest: towards the horizon everything falls ever faster.
+            // From rest z = z_0 / cos(tau), so that everything falls towards the horizon faster and faster.
             states: Some(|bounds| {
                 let n = bounds.positions.len();
                 bounds.positions[n - 1].0 = 0.4;
@@ -101,7 +101,7 @@ pub const fn system(
     }
 }
 
-/// Sum of squares.
+/// Computes the sum of squares.
 fn squares<R: Real>(v: &[R]) -> R {
     v.iter().fold(R::zero(), |sum, &v| sum + v.sqr())
 }

@@ -1,4 +1,4 @@
-//! Free fall outside a black hole, without spin and with it, in the coordinates of Schwarzschild and of Boyer and Lindquist.
+//! Free fall outside a black hole, with or without spin, in Schwarzschild or Boyer-Lindquist coordinates.
 
 use super::angular_velocity;
 use crate::lagrangian::Lagrangian;
@@ -13,13 +13,13 @@ use core::f64::consts::PI;
 
 /// `L = (-f t'^2 + r'^2 / f + r^2 (theta'^2 + sin^2 theta phi'^2)) / 2`, `f = 1 - 2M/r`, per unit of mass.
 ///
-/// `' = d/dtau`, `tau` the proper time; geometric units, `G = c = 1`: `t`, `r`, `tau` and `M` in metres.
+/// Here `' = d/dtau` with the proper time `tau`, in geometric units with `G = c = 1`: `t`, `r`, `tau` and `M` are in metres.
 #[derive(Clone, Copy, Debug)]
 pub struct SchwarzschildGeodesic;
 
 static OF_SCHWARZSCHILD: [Parameter; 1] = [Parameter::new("M", "1", "m", Range::Positive)];
 
-/// States outside a hole in `t`, `r`, `theta`, `phi`.
+/// Bounds of states outside a black hole in `t`, `r`, `theta`, `phi`.
 pub(super) fn bounds(phi: (f64, f64)) -> Bounds {
     Bounds {
         positions: vec![(-10.0, 10.0), (3.0, 15.0), (0.1 * PI, 0.9 * PI), phi],
@@ -34,7 +34,7 @@ pub(super) fn coordinates() -> Vec<Coordinate> {
     vec![Coordinate::length("t"), Coordinate::length("r"), theta, Coordinate::angle("phi")]
 }
 
-/// Orbits that the trajectory test begins.
+/// Orbits for the trajectory test.
 pub(super) fn trajectory() -> TrajectoryTest {
     TrajectoryTest {
         start: Bounds {
@@ -46,7 +46,7 @@ pub(super) fn trajectory() -> TrajectoryTest {
     }
 }
 
-/// The plane seen along the axis, `r` as if space were flat.
+/// The orbital plane seen along the axis, with `r` as if space were flat.
 const PLANE: Plane =
     Plane { labels: ["r cos phi [m]", "r sin phi [m]"], point: |_, q| (q[1] * q[3].cos(), q[1] * q[3].sin()) };
 
@@ -85,8 +85,8 @@ fn turning<R: Real>(q: &[R], v: &[R]) -> R {
     v[2].sqr() + (q[2].sin() * v[3]).sqr()
 }
 
-/// `f = 1 - 2M/r`: below `r = 4M` as `(r - 2M)/r`, where the difference is exact, above as written, where the derivative
-/// of the quotient would cancel.
+/// Computes `f = 1 - 2M/r`: below `r = 4M` as `(r - 2M)/r`, where the difference is exact, and above as written, where the derivative of
+/// the quotient would suffer from cancellation.
 fn redshift<R: Real>(mass: R, r: R) -> R {
     let horizon = R::two() * mass;
     (horizon + horizon - r).select((r - horizon) / r, R::one() - horizon / r)
@@ -134,7 +134,7 @@ impl ClosedForm for SchwarzschildGeodesic {
 /// `L = (-Delta A^2/Sigma + sin^2 theta B^2/Sigma + Sigma (r'^2/Delta + theta'^2))/2` per unit of mass.
 ///
 /// `A = t' - a sin^2 theta phi'`, `B = (r^2 + a^2) phi' - a t'`, `Delta = r^2 - 2 M r + a^2`, `Sigma = r^2 + a^2 cos^2 theta`; `a` is the
-/// angular momentum per mass. `' = d/dtau`, `tau` the proper time; geometric units, `G = c = 1`: all in metres.
+/// angular momentum per mass. Here `' = d/dtau` with the proper time `tau`; in geometric units with `G = c = 1` everything is in metres.
 ///
 /// Source: Boyer and Lindquist, J. Math. Phys. 8, 265 (1967), in the orthogonal forms of Carter, Phys. Rev. 174, 1559 (1968).
 #[derive(Clone, Copy, Debug)]
@@ -228,8 +228,9 @@ impl<R: Real> Forms<R> {
 }
 
 impl KerrGeodesic {
-    /// Carter's constant `K = Sigma^2 theta'^2 + sin^2 theta B^2 - a^2 cos^2 theta g(v, v)`: never negative for free fall slower than light,
-    /// `(L_z - a E)^2` in the equator; `Q = K - (L_z - a E)^2`. `None` for a wrong number of parameters.
+    /// Carter's constant `K = Sigma^2 theta'^2 + sin^2 theta B^2 - a^2 cos^2 theta g(v, v)`, which is never negative for free fall slower
+    /// than light and equals `(L_z - a E)^2` in the equatorial plane; `Q = K - (L_z - a E)^2`. Returns `None` for a wrong number of
+    /// parameters.
     ///
     /// Source: Carter, Phys. Rev. 174, 1559 (1968).
     pub fn carter<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
@@ -252,7 +253,7 @@ impl Lagrangian for KerrGeodesic {
 }
 
 impl ClosedForm for KerrGeodesic {
-    /// From `Delta A = (r^2 + a^2) E - a L_z` and `B = L_z/sin^2 theta - a E`, whose `E` and `L_z` are constant, for `t''` and `phi''`;
+    /// For `t''` and `phi''`, uses `Delta A = (r^2 + a^2) E - a L_z` and `B = L_z/sin^2 theta - a E`, where `E` and `L_z` are constant;
     /// `r'' = Delta (dL/dr - r' (Sigma/Delta)')/Sigma`, `theta'' = (dL/dtheta - theta' Sigma')/Sigma`.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let Some(form) = Forms::new(parameters, q, v) else { return Vec::new() };
@@ -266,7 +267,7 @@ impl ClosedForm for KerrGeodesic {
         let beta = azimuth_rate - two * r * r_dot * phi_dot;
         let t = ((r.sqr() + spin.sqr()) * alpha + spin * sin.sqr() * beta) / sigma;
         let phi = (beta + spin * alpha) / sigma;
-        // (-Delta A^2 + sin^2 theta B^2)/Sigma^2 with its sign turned.
+        // (-Delta A^2 + sin^2 theta B^2)/Sigma^2 with reversed sign.
         let bent = (delta * time.sqr() - (sin * azimuth).sqr()) / sigma.sqr();
         let sigma_theta = -two * spin.sqr() * sin * cos;
         let along_r = r * bent
@@ -280,8 +281,8 @@ impl ClosedForm for KerrGeodesic {
         vec![t, delta * (along_r - r_dot * stretch_rate) / sigma, (along_theta - theta_dot * sigma_rate) / sigma, phi]
     }
 
-    /// `t' = C/(sqrt(b^2 - g_tt C) - b)`, `b = g_tphi phi'`, `C = 1 + g(v, v)` of the velocity without `t'`: future-directed both outside
-    /// and inside the ergosphere.
+    /// `t' = C/(sqrt(b^2 - g_tt C) - b)`, `b = g_tphi phi'`, where `C = 1 + g(v, v)` for the velocity without `t'`; points to the future
+    /// both outside and inside the ergosphere.
     fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
         let still = [R::zero(), v[1], v[2], v[3]];
         let form = Forms::new(parameters, q, &still)?;
@@ -289,7 +290,7 @@ impl ClosedForm for KerrGeodesic {
         let stretch = (form.spin * form.sin).sqr() - form.delta;
         let c = R::one() + form.interval(&still);
         let root = (b.sqr() - stretch / form.sigma * c).sqrt();
-        // For b > 0, a motion against the spin, the other form does not cancel; it needs g_tt < 0.
+        // For b > 0, motion against the spin, the other form avoids cancellation; it needs g_tt < 0.
         let outside = b.select(-stretch, -R::one());
         Some(outside.select((root + b) * form.sigma / (-stretch), c / (root - b)))
     }

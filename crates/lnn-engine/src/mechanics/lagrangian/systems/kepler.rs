@@ -15,7 +15,7 @@ pub struct Kepler;
 
 static PARAMETERS: [Parameter; 1] = [Parameter::new("mu", "1", "m^3/s^2", Range::Positive)];
 
-/// Catalogue entry. The starts of the trajectory test lie on ellipses of eccentricity below 1/2 inside the training box.
+/// Catalogue entry. The initial states of the trajectory test lie on ellipses of eccentricity below 1/2 inside the training box.
 pub const KEPLER: System = System {
     name: Cow::Borrowed("kepler"),
     title: Cow::Borrowed("Kepler problem"),

@@ -1,4 +1,4 @@
-//! Free fall in the field of a black hole, with and without spin and charge, in Cartesian Kerr-Schild coordinates.
+//! Free fall in the field of a black hole, with or without spin and charge, in Cartesian Kerr-Schild coordinates.
 
 use super::{length, lengths};
 use crate::lagrangian::Lagrangian;
@@ -12,18 +12,18 @@ use alloc::vec::Vec;
 
 /// `L = (-t'^2 + x'^2 + y'^2 + z'^2 + f (t' + l.v)^2)/2`, `f = (2 M r - Q^2)/Sigma`, per unit of mass.
 ///
-/// `l = ((r x + a y)/(r^2 + a^2), (r y - a x)/(r^2 + a^2), z/r)`, `r` the root of
-/// `(x^2 + y^2)/(r^2 + a^2) + z^2/r^2 = 1`, `Sigma = r^2 + a^2 z^2/r^2`. The covector `(1, l)` is null and falls inward: nothing is
-/// singular on a horizon or an axis. `' = d/dtau`, `tau` the proper time; geometric units, `G = c = 1`: all in metres.
+/// Here `l = ((r x + a y)/(r^2 + a^2), (r y - a x)/(r^2 + a^2), z/r)`, `r` is the root of `(x^2 + y^2)/(r^2 + a^2) + z^2/r^2 = 1`, and
+/// `Sigma = r^2 + a^2 z^2/r^2`. The covector `(1, l)` is null and points inward, so that nothing is singular on a horizon or an axis. `' =
+/// d/dtau` with the proper time `tau`; in geometric units with `G = c = 1` everything is in metres.
 ///
 /// Source: Kerr and Schild, Proc. Symp. Appl. Math. 17, 199 (1965); Visser, arXiv:0706.0622, eq. (32)-(35).
 #[derive(Clone, Copy, Debug)]
 pub enum KerrSchild {
     /// Mass `M`.
     Schwarzschild,
-    /// Mass `M`, angular momentum per mass `a` along `z`.
+    /// Mass `M` and angular momentum per mass `a` along `z`.
     Kerr,
-    /// Mass `M`, charge `Q`; falling matter has no charge.
+    /// Mass `M` and charge `Q`; the falling matter has no charge.
     ReissnerNordstrom,
 }
 
@@ -101,7 +101,7 @@ pub const fn system(hole: KerrSchild) -> System {
         }),
         learning: LearningAdvice {
             states: Some(match hole {
-                // The ring of a spin lies at R = a.
+                // The ring singularity of a spinning hole lies at R = a.
                 KerrSchild::Kerr => |_| around(1.35),
                 KerrSchild::Schwarzschild | KerrSchild::ReissnerNordstrom => |_| around(1.2),
             }),
@@ -111,7 +111,7 @@ pub const fn system(hole: KerrSchild) -> System {
     }
 }
 
-/// States from inside the horizon to where the advance of periastra is small.
+/// States from inside the horizon out to where the periastron advance is small.
 fn around(low: f64) -> StateAdvice {
     StateAdvice {
         log_uniform: Vec::new(),
@@ -123,7 +123,7 @@ fn around(low: f64) -> StateAdvice {
 
 const TURNING: &str = "energy and angular momentum per mass [1, m]";
 
-/// Refuses the ring, `r = 0`.
+/// Rejects the ring singularity, `r = 0`.
 fn away(hole: KerrSchild, parameters: &[f64], q: &[f64]) -> Result<(), &'static str> {
     match hole.field(parameters, q) {
         Some(field) if field.r > 0.0 && field.sigma > 0.0 => Ok(()),
@@ -131,7 +131,7 @@ fn away(hole: KerrSchild, parameters: &[f64], q: &[f64]) -> Result<(), &'static 
     }
 }
 
-/// The hole at a place.
+/// The field of the black hole at a position.
 struct Field<R> {
     mass: R,
     spin: R,
@@ -150,7 +150,7 @@ fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The last three of four numbers.
+/// Returns the last three of four numbers.
 fn space<R: Real>(x: &[R]) -> [R; 3] {
     [x[1], x[2], x[3]]
 }
@@ -187,7 +187,7 @@ impl KerrSchild {
         Some(Field { mass, spin, charge, r, sigma, f, l })
     }
 
-    /// `-p_t` and `x * p`, the momenta those of `L`.
+    /// Returns `-p_t` and `x * p`, with the momenta of `L`.
     fn turning(self, parameters: &[f64], q: &[f64], v: &[f64]) -> Vec<f64> {
         let Some(Field { f, l, .. }) = self.field(parameters, q) else { return vec![f64::NAN] };
         let ([x, y, z], u) = (space(q), space(v));
@@ -196,8 +196,8 @@ impl KerrSchild {
         vec![v[0] - along, y * k - z * s, z * p - x * k, x * s - y * p]
     }
 
-    /// Carter's constant `K = (l.v) (Delta (l.v) - 2 Sigma r') + r^2 g(v, v)`, `l.v = t' + l_x x' + ..`,
-    /// `Delta = r^2 - 2 M r + a^2 + Q^2`: never negative for free fall slower than light, `(L_z - a E)^2` in the equator. `None` for a
+    /// Carter's constant `K = (l.v) (Delta (l.v) - 2 Sigma r') + r^2 g(v, v)` with `l.v = t' + l_x x' + ..` and `Delta = r^2 - 2 M r + a^2
+    /// + Q^2`. It is never negative for free fall slower than light, and `(L_z - a E)^2` in the equatorial plane. Returns `None` for a
     /// wrong number of parameters.
     ///
     /// Source: Walker and Penrose, Commun. Math. Phys. 18, 265 (1970).
@@ -231,7 +231,7 @@ impl<R: Real> Field<R> {
             let of_sigma = R::two() * (R::two() * r * slope[k] - x[k]);
             (R::two() * mass * slope[k] - f * of_sigma) / sigma
         });
-        // d(r x + a y), d(r y - a x) without the part of dr.
+        // d(r x + a y) and d(r y - a x) without the part from dr.
         let own = [[r, spin, zero], [-spin, r, zero]];
         let across = |i: usize| [0, 1, 2].map(|k| (slope[k] * (x[i] - R::two() * r * l[i]) + own[i][k]) / h);
         let along = [0, 1, 2].map(|k| {
@@ -256,8 +256,8 @@ impl Lagrangian for KerrSchild {
 }
 
 impl ClosedForm for KerrSchild {
-    /// `a = eta^-1 b - f l^# (l^#.b)`, `l^# = eta^-1 l`, the inverse of `eta + f l l` at
-    /// `b_k = w^2 f_k/2 + f w (l_k.v) - (f' w + f l'.v) l_k - f w l_k'`, `w = l.v`, `_k = d/dx_k`.
+    /// `a = eta^-1 b - f l^# (l^#.b)` with `l^# = eta^-1 l`, that is, the inverse of `eta + f l l` applied to `b_k = w^2 f_k/2 + f w
+    /// (l_k.v) - (f' w + f l'.v) l_k - f w l_k'`, `w = l.v`, `_k = d/dx_k`.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let Some(field) = self.field(parameters, q) else { return Vec::new() };
         let (f, l, u) = (field.f, field.l, space(v));
@@ -275,8 +275,8 @@ impl ClosedForm for KerrSchild {
         vec![along - b_t, b[0] - along * l[0], b[1] - along * l[1], b[2] - along * l[2]]
     }
 
-    /// The larger root `t' = (b + s)/(1 - f) = C/(s - b)`, `s = sqrt(b^2 + (1 - f) C)`, `b = f (l.v)`, `C = 1 + v^2 + f (l.v)^2`, outside;
-    /// inside a horizon, `f > 1`, the smaller one, if something falls: not a number otherwise.
+    /// Let `s = sqrt(b^2 + (1 - f) C)`, `b = f (l.v)`, `C = 1 + v^2 + f (l.v)^2`. Outside a horizon the result is the larger root `t' = (b
+    /// + s)/(1 - f) = C/(s - b)`. Inside, where `f > 1`, it is the smaller root if the motion falls inward, and `NaN` otherwise.
     fn constrained_velocity<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
         let Field { f, l, .. } = self.field(parameters, q)?;
         let u = space(v);

@@ -1,5 +1,5 @@
-//! Masses with springs to their neighbours, up to a thousand coordinates: the lattice of Fermi, Pasta, Ulam and Tsingou in a line, and a
-//! hanging cloth.
+//! Masses with springs between neighbours, up to a thousand coordinates: the Fermi-Pasta-Ulam-Tsingou lattice in a line, and a hanging
+//! cloth.
 
 use super::{ACCELERATION_OF_GRAVITY, NOWHERE, length, mass};
 use crate::lagrangian::Lagrangian;
@@ -56,7 +56,7 @@ pub const LATTICE: System = System {
 };
 
 impl Lattice {
-    /// Stretches of the springs from one end to the other.
+    /// Returns the stretches of the springs from one end to the other.
     fn stretches<R: Real>(q: &[R]) -> impl Iterator<Item = R> {
         let next = q.iter().copied().chain([R::zero()]);
         next.scan(R::zero(), |before, q| Some(q - core::mem::replace(before, q)))
@@ -88,15 +88,15 @@ impl ClosedForm for Lattice {
     }
 }
 
-/// A square net of equal masses in space, that hangs on a row of hooks; each mass has springs to its neighbours in its row and column, those of
-/// the first row to the hooks.
+/// A square net of equal masses in space that hangs from a row of hooks. Springs connect each mass to its neighbours in its row and column,
+/// and the first row to the hooks.
 ///
-/// `L = sum m |v|^2 / 2 - sum k (|d|^2 - l^2)^2 / (8 l^2) - sum m g z` with the vectors `d` along the springs. A spring of Green's strain
-/// `(|d|^2 - l^2) / (2 l^2)` has the stiffness `k` at its length `l`, and its force is smooth where its ends meet. Coordinates are `x`, `y`, `z` of
-/// each mass, row by row from above; hook `j` is at `(j l, 0, 0)`, `j` from 0.
+/// `L = sum m |v|^2 / 2 - sum k (|d|^2 - l^2)^2 / (8 l^2) - sum m g z` with the vectors `d` along the springs. A spring with Green's strain
+/// `(|d|^2 - l^2) / (2 l^2)` has stiffness `k` at its rest length `l`, and its force remains smooth when its ends meet. Coordinates are
+/// `x`, `y`, `z` of each mass, row by row from the top; hook `j` is at `(j l, 0, 0)`, with `j` from 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Cloth {
-    /// Number of masses in a row, and of rows.
+    /// Number of masses per row, and of rows.
     pub side: usize,
 }
 
@@ -136,7 +136,7 @@ pub const CLOTH: System = System {
     described: None,
 };
 
-/// Bounds around the places of `n` coordinates in a flat cloth without weight, of springs of 1 m.
+/// Returns bounds around the positions of `n` coordinates in a flat cloth without weight, with springs of 1 m.
 fn around_rest(n: usize, distance: f64, speed: f64) -> Bounds {
     let side = Layout::Net.chosen(n);
     let place = |i: usize| match (i % 3, i / 3) {
@@ -149,7 +149,7 @@ fn around_rest(n: usize, distance: f64, speed: f64) -> Bounds {
 }
 
 impl Cloth {
-    /// Shows each spring: the masses that it pulls, none for a hook, and the vector from the first to the second.
+    /// Calls `spring` for each spring with the indices of its masses, `None` for a hook, and the vector from the first to the second.
     fn springs<R: Real>(&self, l: R, q: &[R], mut spring: impl FnMut(Option<usize>, usize, [R; 3])) {
         let side = self.side;
         let place = |point: usize| [q[3 * point], q[3 * point + 1], q[3 * point + 2]];
@@ -215,7 +215,7 @@ mod tests {
         configure(name, &[("n".to_string(), n.to_string())]).unwrap()
     }
 
-    /// A state within the bounds of validation.
+    /// Returns a state within the validation bounds.
     fn state(instance: &SystemInstance<f64>) -> (Vec<f64>, Vec<f64>) {
         let bounds = instance.system.validation(instance.coordinates);
         let draw = |sides: &[(f64, f64)], by: f64| -> Vec<f64> {
@@ -225,7 +225,7 @@ mod tests {
         (draw(&bounds.positions, 0.37), draw(&bounds.velocities, 0.71))
     }
 
-    /// Largest difference of the accelerations from the closed form, over the largest of these.
+    /// Returns the largest difference from the closed-form accelerations, relative to their maximum.
     fn error(name: &str, n: usize) -> f64 {
         let instance = sized(name, n);
         let (q, v) = state(&instance);

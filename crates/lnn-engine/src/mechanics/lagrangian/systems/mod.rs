@@ -1,5 +1,5 @@
-//! Hand-written systems, one file for each family: Lagrangian, closed-form acceleration, catalogue entry; and the catalogue
-//! of them all.
+//! Hand-written systems, one file for each family: Lagrangian, closed-form acceleration and catalogue entry; and the catalogue of all of
+//! them.
 
 mod anti_de_sitter;
 mod boyer_lindquist;
@@ -30,7 +30,7 @@ use core::any::Any;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-/// One line per system: its catalogue entry and how its Lagrangian is made from the number of coordinates.
+/// Lists one system per line: its catalogue entry and how its Lagrangian is constructed from the number of coordinates.
 macro_rules! catalogue {
     ($($module:ident::$system:ident: $make:expr;)*) => {
         /// The catalogue entries of all systems.
@@ -40,7 +40,7 @@ macro_rules! catalogue {
         #[allow(non_camel_case_types, clippy::upper_case_acronyms)]
         enum Place { $($system),* }
 
-        /// The Euler-Lagrange terms of a configured system.
+        /// Constructs the model of a configured system.
         fn construct<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn EulerLagrange<S>>> {
             let n = configured.coordinates;
             if let Some(described) = &configured.system.described {
@@ -54,7 +54,7 @@ macro_rules! catalogue {
             None
         }
 
-        /// Shows a visitor the Lagrangian of a configured system.
+        /// Passes the Lagrangian of a configured system to a visitor.
         pub(super) fn visit_lagrangian<S, V: LagrangianVisitor>(configured: &SystemInstance<S>, visitor: V) -> Option<V::Output> {
             let n = configured.coordinates;
             if let Some(described) = &configured.system.described {
@@ -67,7 +67,7 @@ macro_rules! catalogue {
             None
         }
 
-        /// The closed-form acceleration of a configured system.
+        /// Computes the closed-form acceleration of a configured system.
         pub(super) fn closed_acceleration<S: Scalar>(configured: &SystemInstance<S>, q: &[S], v: &[S]) -> Vec<S> {
             let n = configured.coordinates;
             $(if configured.system.name == SYSTEMS[Place::$system as usize].name {
@@ -77,7 +77,7 @@ macro_rules! catalogue {
             vec![S::nan(); n]
         }
 
-        /// The velocity of the time-like coordinate on the mass shell, if the system has one.
+        /// Computes the velocity of the time-like coordinate on the mass shell, if the system has one.
         pub(super) fn constrained_velocity<S: Scalar>(configured: &SystemInstance<S>, q: &[S], v: &[S]) -> Option<S> {
             let n = configured.coordinates;
             $(if configured.system.name == SYSTEMS[Place::$system as usize].name {
@@ -112,8 +112,8 @@ catalogue! {
     kerr_schild::KERR_CARTESIAN: |_| KerrSchild::Kerr;
 }
 
-/// [`construct`] with friction, compiled in this crate once for each of its scalars instead of again in every crate that calls it: all
-/// systems under all forward numbers are much code.
+/// Does the same as [`construct`] with friction. It is compiled once for each scalar type in this crate and not in every crate that calls
+/// it, since all systems with all forward-mode numbers are a lot of code.
 pub(super) fn unconstrained<S: Scalar>(configured: &SystemInstance<S>) -> Option<Box<dyn EulerLagrange<S>>> {
     fn single(configured: &SystemInstance<f32>) -> Option<Box<dyn EulerLagrange<f32>>> {
         Some(configured.with_friction(construct(configured)?))
@@ -135,38 +135,38 @@ pub(super) fn unconstrained<S: Scalar>(configured: &SystemInstance<S>) -> Option
     *built.downcast().ok()?
 }
 
-/// A mass of 1 kg.
+/// A mass with the default 1 kg.
 const fn mass(symbol: &'static str) -> Parameter {
     Parameter::new(symbol, "1", "kg", Range::Positive)
 }
-/// A length of 1 m.
+/// A length with the default 1 m.
 const fn length(symbol: &'static str) -> Parameter {
     Parameter::new(symbol, "1", "m", Range::Positive)
 }
-/// The paper's acceleration of gravity; zero and negative values are allowed.
+/// The acceleration of gravity in the paper; zero and negative values are allowed.
 const ACCELERATION_OF_GRAVITY: Parameter = Parameter::new("g", "9.8", "m/s^2", Range::Any);
 
 /// The plane of the first two coordinates, `x` and `y`.
 const X_AND_Y: Plane = Plane { labels: ["x [m]", "y [m]"], point: |_, q| (q[0], q[1]) };
-/// Labels of the place of a chain's last point mass.
+/// Labels for the position of the last point mass of a chain.
 const LAST_BOB: [&str; 2] = ["x of the last bob [m]", "y of the last bob [m]"];
-/// No place, for a wrong number of parameters.
+/// The result for a wrong number of parameters.
 const NOWHERE: (f64, f64) = (f64::NAN, f64::NAN);
 
-/// `e x e'`, `e` the direction of polar angle and azimuth.
+/// Computes `e x e'`, where `e` is the direction given by polar angle and azimuth.
 fn angular_velocity([theta, phi]: [f64; 2], [theta_dot, phi_dot]: [f64; 2]) -> [f64; 3] {
     let ((sin, cos), (sin_phi, cos_phi)) = (theta.sin_cos(), phi.sin_cos());
-    // theta' points along growing phi, sin theta phi' against growing theta.
+    // theta' contributes in the direction of increasing phi, sin theta phi' opposite to increasing theta.
     let along = sin * phi_dot;
     [-sin_phi * theta_dot - along * cos * cos_phi, cos_phi * theta_dot - along * cos * sin_phi, along * sin]
 }
 
-/// Coordinates that are lengths.
+/// Returns coordinates that are lengths.
 fn lengths(names: &[&'static str]) -> Vec<Coordinate> {
     names.iter().map(|&name| Coordinate::length(name)).collect()
 }
 
-/// `theta1`, `theta2`, ..; `theta` if there is one.
+/// Returns `theta1`, `theta2`, and so on; `theta` for a single angle.
 fn angles(n: usize) -> Vec<Coordinate> {
     (1..=n).map(|i| Coordinate::angle(if n == 1 { "theta".into() } else { format!("theta{i}") })).collect()
 }

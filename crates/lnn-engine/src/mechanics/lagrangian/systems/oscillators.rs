@@ -1,5 +1,5 @@
-//! A point mass on a linear spring; a star near the centre of an axisymmetric galaxy (Henon and Heiles 1964), the standard
-//! example of chaos.
+//! A point mass on a linear spring; a star near the centre of an axisymmetric galaxy (Henon and Heiles 1964), the standard example of
+//! chaos.
 
 use super::{X_AND_Y, lengths, mass};
 use crate::lagrangian::Lagrangian;
@@ -60,14 +60,14 @@ impl ClosedForm for HarmonicOscillator {
     }
 }
 
-/// `L = (v_x^2 + v_y^2) / 2 - (x^2 + y^2) / 2 - lambda (x^2 y - y^3 / 3)`, unit mass and frequency; bound below
-/// `E = 1 / (6 lambda^2)`.
+/// `L = (v_x^2 + v_y^2) / 2 - (x^2 + y^2) / 2 - lambda (x^2 y - y^3 / 3)` with unit mass and frequency; motion is bound below `E = 1 / (6
+/// lambda^2)`.
 #[derive(Clone, Copy, Debug)]
 pub struct HenonHeiles;
 
 static OF_HENON_HEILES: [Parameter; 1] = [Parameter::new("lambda", "1", "1/(m s^2)", Range::Any)];
 
-/// Catalogue entry. The starts of the trajectory test lie below the energy of escape.
+/// Catalogue entry. The initial states of the trajectory test are below the escape energy.
 pub const HENON_HEILES: System = System {
     name: Cow::Borrowed("henon-heiles"),
     title: Cow::Borrowed("Henon-Heiles system"),

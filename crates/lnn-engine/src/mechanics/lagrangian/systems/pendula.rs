@@ -1,8 +1,8 @@
-//! Pendula: point masses on massless rods, two, three or any number, angles from the downward vertical; a point mass on a
-//! spring that swings in a plane.
+//! Pendula: two, three or any number of point masses on massless rods, with angles from the downward vertical; a point mass on a spring
+//! that swings in a plane.
 //!
-//! In a chain of pendula, rod `i` of length `l_i` carries the load `mu_i = m_i + m_(i+1) + ..`. Angles of two and three pendula, and those of
-//! closed forms, enter through their differences first, so that a common turn costs no accuracy.
+//! In a chain of pendula, rod `i` of length `l_i` carries the load `mu_i = m_i + m_(i+1) + ..`. For two and three pendula, and in closed
+//! forms, differences of angles are computed first, so that a common rotation costs no accuracy.
 
 use super::{ACCELERATION_OF_GRAVITY, LAST_BOB, NOWHERE, angles, length, mass};
 use crate::lagrangian::Lagrangian;
@@ -48,7 +48,7 @@ pub const DOUBLE_PENDULUM: System = System {
         },
     }),
     conserved: None,
-    // The paper's first phase sees three turns, the others one turn and a little more.
+    // The first phase in the paper uses angles over three turns, the others over slightly more than one turn.
     learning: LearningAdvice {
         paper: Some(PaperBudget {
             states: 60_000,
@@ -81,7 +81,7 @@ impl Lagrangian for DoublePendulum {
 }
 
 impl ClosedForm for DoublePendulum {
-    /// The paper's formulas with the denominator `1 - a1 a2` written without cancellation, `m1 + m2 sin^2 (q1 - q2)`.
+    /// The formulas of the paper, with the denominator `1 - a1 a2` written without cancellation as `m1 + m2 sin^2 (q1 - q2)`.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let [m1, m2, l1, l2, g] = *parameters else { return Vec::new() };
         let (sin, cos) = (q[0] - q[1]).sin_cos();
@@ -135,7 +135,7 @@ pub const TRIPLE_PENDULUM: System = System {
     described: None,
 };
 
-/// Masses carried by each rod, lengths, acceleration of gravity.
+/// Returns the masses carried by each rod, the lengths, and the acceleration of gravity.
 fn loads<R: Real>(parameters: &[R]) -> Option<([R; 3], [R; 3], R)> {
     let [m1, m2, m3, l1, l2, l3, g] = *parameters else { return None };
     Some(([m1 + (m2 + m3), m2 + m3, m3], [l1, l2, l3], g))
@@ -155,17 +155,18 @@ impl Lagrangian for TriplePendulum {
 }
 
 impl ClosedForm for TriplePendulum {
-    /// `M a = F` with the paper's mass matrix and forces.
+    /// Solves `M a = F` with the mass matrix and forces of the paper.
     fn acceleration<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> Vec<R> {
         let Some((loads, lengths, g)) = loads(parameters) else { return Vec::new() };
         chain_acceleration(&loads, &lengths, g, q, v)
     }
 }
 
-/// `n` equal masses `m` on rods of equal length `l`: rod `i` carries `(n - i) m`, `i` from 0.
+/// `n` equal masses `m` on rods of equal length `l`: rod `i`, counted from 0, carries `(n - i) m`.
 ///
-/// `L = m l^2 sum_i (n - i) v_i (v_i / 2 + x_i cos q_i + y_i sin q_i) + m g l sum_i (n - i) cos q_i` with the velocity of the bob before in
-/// rods per time, the running sums `x_i = sum_(j<i) v_j cos q_j` and `y_i = sum_(j<i) v_j sin q_j`: operations grow with `n`.
+/// `L = m l^2 sum_i (n - i) v_i (v_i / 2 + x_i cos q_i + y_i sin q_i) + m g l sum_i (n - i) cos q_i`, where the running sums `x_i =
+/// sum_(j<i) v_j cos q_j` and `y_i = sum_(j<i) v_j sin q_j` are the velocity of the previous bob in units of `l`. The number of operations
+/// is proportional to `n`.
 #[derive(Clone, Copy, Debug)]
 pub struct NPendulum {
     /// Number of pendula.
@@ -205,7 +206,7 @@ pub const N_PENDULUM: System = System {
 };
 
 impl NPendulum {
-    /// Masses carried by each rod, lengths, acceleration of gravity.
+    /// Returns the masses carried by each rod, the lengths, and the acceleration of gravity.
     fn loads<R: Real>(&self, parameters: &[R]) -> Option<(Vec<R>, Vec<R>, R)> {
         let [m, l, g] = *parameters else { return None };
         let loads = (0..self.n).map(|i| R::of((self.n - i) as f64) * m).collect();
@@ -238,7 +239,7 @@ impl ClosedForm for NPendulum {
     }
 }
 
-/// Place of the last point mass, `x = sum_i l_i sin q_i`, `y = -sum_i l_i cos q_i`, the pivot at the origin.
+/// Returns the position of the last point mass, `x = sum_i l_i sin q_i`, `y = -sum_i l_i cos q_i`, with the pivot at the origin.
 fn chain_end(lengths: &[f64], q: &[f64]) -> (f64, f64) {
     lengths.iter().zip(q).fold((0.0, 0.0), |(x, y), (l, q)| (x + l * q.sin(), y - l * q.cos()))
 }
@@ -263,7 +264,7 @@ fn chain_lagrangian<R: Real>(loads: &[R], lengths: &[R], g: R, q: &[R], v: &[R])
 /// `F_i = -sum_j mu_max(i,j) l_i l_j v_j^2 sin(q_i - q_j) - mu_i g l_i sin q_i`, by Cholesky's method.
 fn chain_acceleration<R: Real>(loads: &[R], lengths: &[R], g: R, q: &[R], v: &[R]) -> Vec<R> {
     let n = q.len();
-    // Divided by l_i on both sides: unknowns l_j a_j.
+    // Both sides are divided by l_i; the unknowns are l_j a_j.
     let mut m = vec![R::zero(); n * n];
     let mut force = Vec::with_capacity(n);
     for i in 0..n {
@@ -280,7 +281,7 @@ fn chain_acceleration<R: Real>(loads: &[R], lengths: &[R], g: R, q: &[R], v: &[R
         }
         force.push(sum);
     }
-    // M = L D L^T; column k below the diagonal keeps L times its pivot.
+    // M = L D L^T; below the diagonal, column k contains L times its pivot.
     for k in 0..n {
         for i in k + 1..n {
             let factor = m[i * n + k] / m[k * n + k];
@@ -336,7 +337,7 @@ pub const SPRING_PENDULUM: System = System {
     plane: Some(Plane { labels: ["x [m]", "y [m]"], point: |_, q| (q[0] * q[1].sin(), -(q[0] * q[1].cos())) }),
     conserved: None,
     learning: LearningAdvice {
-        // A short spring turns fast, and its angle is accelerated a thousand times more than others.
+        // A short spring rotates fast, and its angular acceleration is a thousand times larger than elsewhere.
         states: Some(|bounds| {
             bounds.velocities = vec![(-7.0, 7.0), (-10.0, 10.0)];
             StateAdvice {

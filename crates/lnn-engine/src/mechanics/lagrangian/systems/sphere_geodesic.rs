@@ -54,7 +54,7 @@ pub const SPHERE: System = System {
             _ => NOWHERE,
         },
     }),
-    // A relative error d of it bounds the angle off the plane of the great circle and the relative error of the speed.
+    // A relative error d of this vector bounds the angle between motion and great circle, and the relative error of the speed.
     conserved: Some(Conserved {
         name: "angular momentum [kg m^2/s]",
         vector: |parameters, q, v| {
@@ -63,7 +63,7 @@ pub const SPHERE: System = System {
         },
     }),
     learning: LearningAdvice {
-        // Near the poles the azimuth changes fast, and most great circles of the test are slower than the box.
+        // Near the poles the azimuth changes fast, and most great circles of the test are slower than states in the box.
         states: Some(|bounds| {
             bounds.velocities[1] = (-6.5, 6.5);
             StateAdvice { log_uniform: Vec::new(), acceleration_weighting: 0.3, trajectory_fraction: 0.5, shell: None }

@@ -59,10 +59,10 @@ impl ClosedForm for ConstantForce {
     }
 }
 
-/// `L = -m c^2 sqrt(1 - v^2/c^2) + q (A.v - phi)`, `A = B (-y, x, 0) / 2`, `phi = -E x`: magnetic field `B` along `z`,
-/// electric field `E` along `x`. Not quadratic in `v`; `M = gamma m (1 + gamma^2 v v^T / c^2)`.
+/// `L = -m c^2 sqrt(1 - v^2/c^2) + q (A.v - phi)` with `A = B (-y, x, 0) / 2` and `phi = -E x`: a magnetic field `B` along `z` and an
+/// electric field `E` along `x`. It is not quadratic in `v`; `M = gamma m (1 + gamma^2 v v^T / c^2)`.
 ///
-/// Everything is `NaN` unless `|v| < c`. The default `c = 1` means natural units; with `c` in m/s all is in SI units.
+/// All results are `NaN` unless `|v| < c`. The default `c = 1` means natural units; with `c` in m/s everything is in SI units.
 #[derive(Clone, Copy, Debug)]
 pub struct ChargedParticle;
 
@@ -74,7 +74,7 @@ static OF_CHARGED_PARTICLE: [Parameter; 5] = [
     Parameter::new("E", "0.1", "V/m", Range::Any),
 ];
 
-/// Catalogue entry. The corners of the boxes of velocities are slower than light.
+/// Catalogue entry. Even the corners of the velocity boxes are slower than light.
 pub const CHARGED_PARTICLE: System = System {
     name: Cow::Borrowed("charged-particle"),
     title: Cow::Borrowed("Relativistic charged particle"),
@@ -98,10 +98,10 @@ pub const CHARGED_PARTICLE: System = System {
     described: None,
 };
 
-/// `1 - v^2/c^2`, `NaN` unless it is positive.
+/// Computes `1 - v^2/c^2`, `NaN` unless it is positive.
 ///
-/// The largest component `w` enters as `(c - w) (c + w)` close to `c`, where that is exact, and as `c^2 - w^2` far from
-/// it, where the derivative of the product would cancel.
+/// The largest component `w` enters as `(c - w) (c + w)` close to `c`, where that is exact, and as `c^2 - w^2` far from it, where the
+/// derivative of the product would suffer from cancellation.
 fn gamma_to_minus_two<R: Real>(c: R, v: &[R]) -> R {
     let (mut w, mut others) = (v[0], R::zero());
     for &x in &v[1..] {

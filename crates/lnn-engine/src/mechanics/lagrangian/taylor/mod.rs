@@ -1,9 +1,9 @@
-//! Taylor polynomials of a function of positions and velocities, of the second degree in each: the number that a Lagrangian is
-//! evaluated on for the second derivatives of its mass matrix.
+//! Taylor polynomials of a function of positions and velocities, of second degree in each. A Lagrangian is evaluated with such numbers to
+//! get the second derivatives of its mass matrix.
 //!
-//! A number stores only its own degrees: a constant has one coefficient, a function of the positions only coefficients of the positions,
-//! and a number linear in the velocities no squares of them. With `n` positions and velocities the largest numbers have `((n + 1)(n +
-//! 2)/2)^2` coefficients, and one evaluation gives all of them.
+//! A number only stores the degrees it has: a constant has one coefficient, a function of the positions only has coefficients of the
+//! positions, and a number linear in the velocities has no squares of them. With `n` positions and velocities the largest numbers have `((n
+//! + 1)(n + 2)/2)^2` coefficients, and one evaluation gives all of them.
 
 mod number;
 
@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::fmt;
 
-/// Variables at a point, and the coefficients of all numbers made of them.
+/// Variables at a point, and the coefficients of all numbers computed from them.
 #[derive(Debug)]
 pub(crate) struct Space<S> {
     variables: Variables,
@@ -20,12 +20,12 @@ pub(crate) struct Space<S> {
     scratch: RefCell<[Vec<S>; 3]>,
 }
 
-/// Taylor polynomial about a point: `sum c x^a`, `x` the displacements of positions and velocities.
+/// A Taylor polynomial about a point: `sum c x^a`, where `x` are the displacements of positions and velocities.
 #[derive(Clone, Copy)]
 pub struct Taylor<'a, S> {
     /// Value at the point.
     value: S,
-    /// The coefficients, the value first; a constant has none.
+    /// The location of the coefficients, the first of which is the value; `None` for a constant.
     place: Option<Place<'a, S>>,
 }
 
@@ -43,23 +43,23 @@ impl<S: fmt::Debug> fmt::Debug for Taylor<'_, S> {
 }
 
 impl<S: Scalar> Space<S> {
-    /// A space without numbers.
+    /// Returns a space without numbers.
     pub(crate) fn new(positions: usize, velocities: usize) -> Self {
         let variables = Variables { velocities, positions };
         Self { variables, numbers: RefCell::default(), scratch: RefCell::default() }
     }
 
-    /// Forgets all numbers but constants; keeps the memory.
+    /// Deletes all numbers except constants, but keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.numbers.get_mut().clear();
     }
 
-    /// The position `index` at `value`.
+    /// Returns the position with this index at `value`.
     pub(crate) fn position(&self, index: usize, value: S) -> Taylor<'_, S> {
         self.variable(Degrees { velocities: 0, positions: 1 }, 1 + index, value)
     }
 
-    /// The velocity `index` at `value`.
+    /// Returns the velocity with this index at `value`.
     pub(crate) fn velocity(&self, index: usize, value: S) -> Taylor<'_, S> {
         self.variable(Degrees { velocities: 1, positions: 0 }, 1 + index, value)
     }
@@ -71,7 +71,7 @@ impl<S: Scalar> Space<S> {
         })
     }
 
-    /// A number whose coefficients, 0 at first, are filled in, given those of all numbers before it.
+    /// Adds a number; `fill` computes its coefficients, which are 0 at first, from those of all earlier numbers.
     fn number(&self, degrees: Degrees, fill: impl FnOnce(&[S], &mut [S])) -> Taylor<'_, S> {
         let mut numbers = self.numbers.borrow_mut();
         let start = numbers.len();
@@ -81,8 +81,8 @@ impl<S: Scalar> Space<S> {
         Taylor { value: out[0], place: Some(Place { space: self, start, degrees }) }
     }
 
-    /// The derivative `d2/dv_i dv_j` of a number and its derivatives by the positions, into `value`, `first` `(n)` and
-    /// `second` `(n, n)`.
+    /// Writes the derivative `d2/dv_i dv_j` of a number and its derivatives by the positions to `value`, `first`, `(n)`, and `second`, `(n,
+    /// n)`.
     pub(crate) fn velocity_hessian(
         &self,
         number: Taylor<'_, S>,
@@ -117,7 +117,7 @@ impl<S: Scalar> Space<S> {
 }
 
 impl<'a, S> Place<'a, S> {
-    /// The coefficients among those of all numbers.
+    /// Returns the coefficients of this number from those of all numbers.
     fn of(self, numbers: &[S]) -> (&[S], Degrees)
     where
         S: Scalar,
@@ -129,7 +129,7 @@ impl<'a, S> Place<'a, S> {
 /// Largest degree that is kept.
 const DEGREE: usize = 2;
 
-/// Number of the monomials of `n` variables up to a degree of at most 2: `1`, then `x_i`, then `x_i x_j` with `j <= i`.
+/// Returns the number of monomials of `n` variables up to a degree of at most 2, in the order `1`, `x_i`, `x_i x_j` with `j <= i`.
 fn count(n: usize, degree: usize) -> usize {
     match degree {
         0 => 1,
@@ -138,7 +138,7 @@ fn count(n: usize, degree: usize) -> usize {
     }
 }
 
-/// Place of `x_i x_j`.
+/// Returns the index of `x_i x_j`.
 fn pair(n: usize, i: usize, j: usize) -> usize {
     let (i, j) = (i.max(j), i.min(j));
     1 + n + i * (i + 1) / 2 + j
@@ -152,30 +152,30 @@ struct Degrees {
 }
 
 impl Degrees {
-    /// Of a sum.
+    /// Returns the degrees of a sum.
     pub fn of_sum(self, other: Self) -> Self {
         Self { velocities: self.velocities.max(other.velocities), positions: self.positions.max(other.positions) }
     }
-    /// Of a product.
+    /// Returns the degrees of a product.
     pub fn of_product(self, other: Self) -> Self {
         Self {
             velocities: DEGREE.min(self.velocities + other.velocities),
             positions: DEGREE.min(self.positions + other.positions),
         }
     }
-    /// Degrees of a power series in it.
+    /// Returns the degrees of a power series in this number.
     pub fn of_series(self) -> Self {
         let all = |degree: usize| if degree > 0 { DEGREE } else { 0 };
         Self { velocities: all(self.velocities), positions: all(self.positions) }
     }
-    /// Largest total degree of its powers that is kept.
+    /// Returns the largest total degree of its powers that is kept.
     pub fn total(self) -> usize {
         let all = self.of_series();
         all.velocities + all.positions
     }
 }
 
-/// Numbers of variables: a polynomial is one block of coefficients by the positions for each monomial of the velocities.
+/// Numbers of variables. A polynomial consists of one block of position coefficients for each monomial of the velocities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Variables {
     pub velocities: usize,
@@ -183,16 +183,16 @@ struct Variables {
 }
 
 impl Variables {
-    /// Coefficients of a polynomial.
+    /// Returns the number of coefficients of a polynomial.
     pub fn size(self, degrees: Degrees) -> usize {
         count(self.velocities, degrees.velocities) * self.block(degrees)
     }
-    /// Coefficients of a block.
+    /// Returns the number of coefficients of a block.
     pub fn block(self, degrees: Degrees) -> usize {
         count(self.positions, degrees.positions)
     }
 
-    /// `out += factor a`, where `out` has at least the degrees of `a`.
+    /// Computes `out += factor a`, where `out` has at least the degrees of `a`.
     pub fn add_scaled<S: Scalar>(self, factor: S, (a, from): (&[S], Degrees), (out, to): (&mut [S], Degrees)) {
         let blocks = a.chunks_exact(self.block(from)).zip(out.chunks_exact_mut(self.block(to)));
         for (a, out) in blocks {
@@ -200,7 +200,7 @@ impl Variables {
         }
     }
 
-    /// `out = a b`, cut off at the degrees of `out`, which are [`Degrees::of_product`] or more.
+    /// Computes `out = a b`, truncated to the degrees of `out`, which are at least [`Degrees::of_product`].
     pub fn multiply<S: Scalar>(
         self,
         (a, of_a): (&[S], Degrees),
@@ -215,7 +215,7 @@ impl Variables {
             if empty(a) {
                 continue;
             }
-            // The monomials by which `p` may be multiplied.
+            // The monomials by which `p` is multiplied.
             let others = match p {
                 0 => count(n, of_b.velocities),
                 _ if p <= n => count(n, of_b.velocities.min(1)),
@@ -235,7 +235,7 @@ impl Variables {
     }
 }
 
-/// `out += a b` for coefficients by the positions.
+/// Computes `out += a b` for position coefficients.
 fn accumulate<S: Scalar>(n: usize, a: &[S], b: &[S], out: &mut [S]) {
     let (first, second) = (a[0], b[0]);
     out.iter_mut().zip(b).for_each(|(out, &b)| *out += first * b);
@@ -257,7 +257,7 @@ fn accumulate<S: Scalar>(n: usize, a: &[S], b: &[S], out: &mut [S]) {
 
 #[cfg(test)]
 mod tests {
-    //! Every function of the table against forward numbers nested twice, in double-double.
+    //! Compares every function of the table with twice nested forward-mode numbers in double-double precision.
 
     use super::Space;
     use crate::forward::HyperDual;
@@ -275,7 +275,7 @@ mod tests {
         fn of<R: Real<Scalar = Dd>>(&self, q: &[R], v: &[R]) -> R;
     }
 
-    /// Near `base`, every kind of term.
+    /// Returns a number near `base` that contains every kind of term.
     fn mixed<R: Real>(base: f64, q: &[R], v: &[R]) -> R {
         let c = R::of;
         c(base) + c(0.3) * q[0] + c(0.2) * q[1] * q[1] + c(0.5) * v[0] * (q[1] + c(1.0)) + c(0.1) * v[1] * v[0]
@@ -314,11 +314,11 @@ mod tests {
         }
     }
 
-    /// Derivatives by two velocities and two positions, all pairs.
+    /// Compares derivatives by two velocities and two positions, for all pairs.
     fn check(what: &str, f: &impl Function) {
         let (q, v) = ([dd(0.25), dd(-0.125)], [dd(0.375), dd(0.5)]);
         let mut space = Space::new(2, 2);
-        // Earlier numbers leave no traces.
+        // Earlier numbers must not affect the result.
         f.of(&[space.position(0, q[0]), space.position(1, q[1])], &[space.velocity(0, v[0]), space.velocity(1, v[1])]);
         space.clear();
         let found = f.of(&[0, 1].map(|i| space.position(i, q[i])), &[0, 1].map(|i| space.velocity(i, v[i])));

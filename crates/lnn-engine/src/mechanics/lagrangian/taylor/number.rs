@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 impl<'a, S: Scalar> Taylor<'a, S> {
-    /// `self * factor`, a factor 0 leaving nothing.
+    /// Computes `self * factor`; a factor 0 gives zero.
     fn scaled(self, factor: S) -> Self {
         let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
         match self.place {
@@ -27,7 +27,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
         })
     }
 
-    /// The same number with another value.
+    /// Returns the same number with another value.
     fn with_value(self, value: S) -> Self {
         match self.place {
             None => Self::constant(value),
@@ -38,7 +38,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
         }
     }
 
-    /// `self + factor other`.
+    /// Computes `self + factor other`.
     fn plus(self, factor: S, other: Self) -> Self {
         let value = self.value + factor * other.value;
         match (self.place, other.place) {
@@ -56,7 +56,8 @@ impl<'a, S: Scalar> Taylor<'a, S> {
         }
     }
 
-    /// `f` of this number from the derivatives `f, f', .., f''''` at its value: `sum f^(k) h^k / k!`, `h` the rest of the number.
+    /// Computes `f` of this number from the derivatives `f, f', .., f''''` at its value: `sum f^(k) h^k / k!`, where `h` is the number
+    /// without its value.
     fn compose(self, derivatives: [S; 5]) -> Self {
         let Some(place) = self.place else { return Self::constant(derivatives[0]) };
         let (degrees, variables) = (place.degrees.of_series(), place.space.variables);
@@ -86,7 +87,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
         })
     }
 
-    /// A function of the table; its third and fourth derivatives come from its second one.
+    /// Applies a function of the table; its third and fourth derivatives are computed from its second one.
     fn chain(self, f: impl Elementary) -> Self {
         let zero = <S as Real>::zero();
         match self.place {
@@ -103,7 +104,7 @@ impl<'a, S: Scalar> Taylor<'a, S> {
         }
     }
 
-    /// The constant power of a number that is not constant: `b (b - 1) .. a^(b - k)`.
+    /// Raises a number that is not constant to a constant power: `b (b - 1) .. a^(b - k)`.
     fn constant_power(self, exponent: S) -> Self {
         let (mut factor, mut power) = (<S as Real>::one(), exponent);
         let mut derivatives = [<S as Real>::zero(); 5];
@@ -167,7 +168,7 @@ impl<S: Scalar> Div for Taylor<'_, S> {
 }
 assign_operators!([S: Scalar] Taylor<'_, S>);
 
-/// Callback of `unary_methods`: one method of [`Real`] per row of the table.
+/// Callback of `unary_methods`: defines one method of [`Real`] per row of the table.
 macro_rules! taylor_unary {
     ($($name:ident $method:ident)*) => {$(
         fn $method(self) -> Self {
@@ -215,7 +216,7 @@ impl<S: Scalar> Real for Taylor<'_, S> {
         if self.place.is_none() && x.place.is_none() {
             return Self::constant(angle);
         }
-        // The angle between the point and the number about it.
+        // The angle between the expansion point and the displaced number.
         let larger = self.value.abs().max(x.value.abs());
         let (cos, sin) = (x.value / larger, self.value / larger);
         let across = self.scaled(cos).plus(-<S as Real>::one(), x.scaled(sin));
@@ -245,7 +246,7 @@ impl<S: Scalar> Real for Taylor<'_, S> {
         (self.compose([sin, cos, -sin, -cos, sin]), self.compose([cos, -sin, -cos, sin, cos]))
     }
 
-    /// One matrix product where the weights are constants.
+    /// A single matrix product, if the weights are constants.
     fn affine(weights: &[Self], bias: &[Self], x: &[Self]) -> Vec<Self> {
         assert!(!x.is_empty() && weights.len().is_multiple_of(x.len()), "a matrix of whole rows");
         assert!(bias.is_empty() || bias.len() == weights.len() / x.len(), "a bias for every row");
@@ -265,8 +266,8 @@ impl<S: Scalar> Real for Taylor<'_, S> {
 }
 
 impl<S: Scalar> Space<S> {
-    /// `W x + b` by the values of the constants `weights`, `(outputs, x.len())`, and `bias`, `(outputs)` or empty; `degrees` are
-    /// at least those of every `x`.
+    /// Computes `W x + b` with constant `weights`, `(outputs, x.len())`, and `bias`, `(outputs)` or empty; `degrees` must be at least those
+    /// of every `x`.
     pub(super) fn layer<'a>(
         &'a self,
         degrees: Degrees,

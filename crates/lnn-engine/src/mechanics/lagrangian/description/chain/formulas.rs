@@ -1,4 +1,4 @@
-//! The formulas of links: the Lagrangian of each as a sum of products, its parts as definitions.
+//! Formulas of links: the Lagrangian of each link as a sum of products, with its parts as definitions.
 
 use super::joints::sine_cosine;
 use crate::lagrangian::description::quantity::Decimal;
@@ -9,7 +9,7 @@ use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-/// A number times names; without names the number alone.
+/// A product of a number and names; without names just the number.
 #[derive(Clone, Debug)]
 pub(super) struct Term {
     factor: f64,
@@ -33,7 +33,7 @@ impl Term {
 
 type Vector = [Term; 3];
 
-/// A sum of terms as a formula.
+/// Formats a sum of terms as a formula.
 pub(super) fn formula(terms: &[Term]) -> String {
     let mut text = String::new();
     for term in terms.iter().filter(|term| term.factor != 0.0) {
@@ -49,14 +49,14 @@ pub(super) fn formula(terms: &[Term]) -> String {
     if text.is_empty() { "0".to_string() } else { text }
 }
 
-/// `(a x b)_i` as two terms.
+/// Returns `(a x b)_i` as two terms.
 fn cross(a: &Vector, b: &Vector, i: usize) -> [Term; 2] {
     let (j, k) = ((i + 1) % 3, (i + 2) % 3);
     [a[j].times(&b[k]), a[k].times(&b[j]).scaled(-1.0)]
 }
 
 impl Description {
-    /// Adds a link: the name of its part of the Lagrangian, and its base for other links.
+    /// Adds a link; returns the name of its part of the Lagrangian and the base for the next links.
     pub(super) fn add_link(
         &mut self,
         (number, joint): (usize, &Joint),
@@ -122,7 +122,8 @@ impl Description {
         Ok((own("L"), there))
     }
 
-    /// `R^T x` and what the joint adds along its axis: first back about z by the bend, then about x, then about z.
+    /// Returns `R^T x` plus the joint's contribution along its axis. The inverse rotation is applied in order: about z by the bend, about
+    /// x, about z.
     fn inward(
         &mut self,
         name: &str,
@@ -143,7 +144,7 @@ impl Description {
         ])
     }
 
-    /// A vector of the frame of a joint in the frame of the constants of its link.
+    /// Rotates a vector from the frame of a joint to the frame in which the constants of its link are given.
     fn in_frame(&mut self, name: &str, joint: &Joint, vector: &Vector) -> Result<Vector, DescriptionError> {
         let Some(axes) = joint.axes else { return Ok(vector.clone()) };
         let mut part = |i: usize| {
@@ -153,7 +154,7 @@ impl Description {
         Ok([part(0)?, part(1)?, part(2)?])
     }
 
-    /// Terms of Rayleigh's function of a joint: `Fv q_dot^2/2 + Fc s ln cosh(q_dot/s)`.
+    /// Adds the terms of a joint to Rayleigh's function: `Fv q_dot^2/2 + Fc s ln cosh(q_dot/s)`.
     pub(super) fn add_friction(
         &mut self,
         (number, joint): (usize, &Joint),
@@ -163,7 +164,7 @@ impl Description {
         let (at, ratio) = joint.drive;
         let velocity = format!("{}_dot", self.coordinates[at].name);
         let dry = format!("link{number}_dry");
-        // ln cosh x = |x| + ln(1 + exp(-2 |x|)) - ln 2, which no speed overflows.
+        // ln cosh x = |x| + ln(1 + exp(-2 |x|)) - ln 2 does not overflow at any speed.
         let size = format!("abs({velocity}/{})", speed / ratio.abs());
         self.define_part(dry.clone(), format!("{speed}*({size} + ln1p(exp(-2*{size})))"))?;
         self.add_constants(number, &[("Fv".to_string(), units[0], 0.0), ("Fc".to_string(), units[1], 0.0)]);
@@ -175,7 +176,7 @@ impl Description {
         Ok([viscous, constant("Fc").times(&Term::name(dry))])
     }
 
-    /// Unknown constants of a link.
+    /// Adds the unknown constants of a link.
     fn add_constants(&mut self, number: usize, constants: &[(String, &str, f64)]) {
         for (name, unit, value) in constants {
             let own = ParameterDescription {
@@ -190,7 +191,7 @@ impl Description {
         }
     }
 
-    /// A sum of terms as one expression, with a definition if needed.
+    /// Turns a sum of terms into one term, with a definition if needed.
     fn sum(&mut self, name: String, terms: &[Term]) -> Result<Term, DescriptionError> {
         let mut all: Vec<Term> = Vec::with_capacity(terms.len());
         for term in terms.iter().filter(|term| term.factor != 0.0) {
@@ -220,7 +221,7 @@ impl Description {
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Motion of the carrier of a link, in the frame of its joint, the acceleration of gravity there, and `g.r` of its origin.
+/// Motion of the link that carries another one, in the frame of its joint, with the acceleration of gravity there and `g.r` of its origin.
 #[derive(Clone)]
 pub(super) struct Base {
     turning: Vector,
@@ -230,7 +231,7 @@ pub(super) struct Base {
 }
 
 impl Base {
-    /// A base on the ground.
+    /// Returns a base at rest.
     pub(super) fn at_rest(gravity: [f64; 3]) -> Self {
         let still = [0.0; 3].map(Term::number);
         Self { turning: still.clone(), moving: still, gravity: gravity.map(Term::number), height: Term::number(0.0) }

@@ -1,4 +1,4 @@
-//! Frames of the joints of a description: from its rows to frames whose `z` is the axis of the joint.
+//! Joint frames of a description: converts its rows to frames whose `z` is the axis of the joint.
 
 use super::Convention;
 use crate::lagrangian::description::{Description, DescriptionError, Quantity};
@@ -7,9 +7,9 @@ use alloc::vec::Vec;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-/// Size of a sine or cosine that counts as rounding.
+/// A sine or cosine below this counts as rounding error.
 const ROUNDING: f64 = 1e-15;
-/// Frame of the base, and of a link whose constants are given in the frame of its joint.
+/// The identity, for the base and for links whose constants are given in the frame of their joint.
 const SAME: Matrix<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 type Outcome<T> = Result<T, DescriptionError>;
@@ -18,12 +18,12 @@ fn exact(x: f64) -> f64 {
     if x.abs() < ROUNDING { 0.0 } else { x }
 }
 
-/// Sine and cosine, exact at quarter turns.
+/// Computes sine and cosine, exact at multiples of a quarter turn.
 pub(super) fn sine_cosine(angle: f64) -> [f64; 2] {
     [angle.sin(), angle.cos()].map(exact)
 }
 
-/// `Rot_z(yaw) Rot_y(pitch) Rot_x(roll)`.
+/// Computes `Rot_z(yaw) Rot_y(pitch) Rot_x(roll)`.
 pub fn turned([roll, pitch, yaw]: [f64; 3]) -> Matrix<f64> {
     let [[sr, cr], [sp, cp], [sy, cy]] = [roll, pitch, yaw].map(sine_cosine);
     let about_y = [[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]];
@@ -38,7 +38,7 @@ fn about_z([s, c]: [f64; 2]) -> Matrix<f64> {
     [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
 }
 
-/// Axes of a joint, as columns; the third is `axis`. If that is an axis of the frame, so are the others.
+/// Returns axes of a joint as columns, the third of which is `axis`. If `axis` is an axis of the frame, so are the other two.
 fn around(axis: [f64; 3]) -> Matrix<f64> {
     let far = if axis[0].abs() > axis[1].abs() { 0 } else { 1 };
     let far = if axis[2].abs() > axis[far].abs() { 2 } else { far };
@@ -54,7 +54,7 @@ fn unit(x: [f64; 3]) -> [f64; 3] {
     x.map(|x| x / length)
 }
 
-/// Bend, twist and angle of a turn `Rot_z(gamma) Rot_x(alpha) Rot_z(theta)`; without a bend if it has none.
+/// Decomposes a rotation `Rot_z(gamma) Rot_x(alpha) Rot_z(theta)` into bend, twist and angle; the bend is zero if possible.
 fn parts(turn: &Matrix<f64>) -> ([f64; 2], [f64; 2], f64) {
     let turn = turn.map(|row| row.map(exact));
     let (x, y) = (turn[0][2], -turn[1][2]);
@@ -66,7 +66,7 @@ fn parts(turn: &Matrix<f64>) -> ([f64; 2], [f64; 2], f64) {
 }
 
 impl Description {
-    /// The joints of its links; checks their descriptions.
+    /// Converts the links to joints and checks their descriptions.
     pub(super) fn joints(&self) -> Outcome<Vec<Joint>> {
         let mut own: Vec<Option<usize>> = Vec::with_capacity(self.links.len());
         for link in &self.links {
@@ -98,7 +98,7 @@ impl Description {
         Ok(joints)
     }
 
-    /// The joint of a link without its drive, whose parent's joint has these axes in the frame of the parent.
+    /// Converts one link to a joint, except for its drive; `axes` are those of the parent's joint in the parent's frame.
     fn joint(&self, k: usize, parent: Option<usize>, axes: Option<Matrix<f64>>) -> Outcome<Joint> {
         let link = &self.links[k];
         let mut joint = Joint {
@@ -136,7 +136,7 @@ impl Description {
         Ok(joint)
     }
 
-    /// Length and twist before the joint of a link: the standard row ends where the modified rows of the next joints begin.
+    /// Returns the length and twist before the joint of a link: a standard row ends where a modified row begins.
     fn before(&self, k: usize, parent: Option<usize>) -> [f64; 2] {
         let of = |k: usize| [self.links[k].a.0, self.links[k].alpha.0];
         if self.is_standard() { parent.map_or([0.0; 2], of) } else { of(k) }
@@ -146,13 +146,13 @@ impl Description {
         self.chain.as_ref().is_some_and(|chain| chain.convention == Convention::Standard)
     }
 
-    /// Index of a link, from 1, by its name or number; 0 for the base.
+    /// Returns the index of a link, from 1, by its name or number; 0 for the base.
     fn numbered(&self, text: &str) -> Option<usize> {
         let named = self.links.iter().position(|link| link.name.as_deref() == Some(text));
         named.map(|at| at + 1).or_else(|| text.parse().ok().filter(|number| *number <= self.links.len()))
     }
 
-    /// Index of the link that carries another one, `None` for the base.
+    /// Returns the index of the link that carries another one, `None` for the base.
     fn parent(&self, k: usize) -> Outcome<Option<usize>> {
         let Some(text) = &self.links[k].parent else { return Ok(k.checked_sub(1)) };
         let number = self.numbered(text).filter(|number| *number <= k);
@@ -166,7 +166,7 @@ impl Description {
         Ok(number.ok_or_else(problem)?.checked_sub(1))
     }
 
-    /// Keys of a link by themselves.
+    /// Checks the keys of one link.
     fn check_link(&self, k: usize) -> Outcome<()> {
         let link = &self.links[k];
         let rows = [("a", link.a), ("alpha", link.alpha), ("d", link.d), ("theta", link.theta)];
@@ -214,7 +214,7 @@ fn fault(k: usize, key: &str, problem: &str) -> DescriptionError {
     DescriptionError::new(format!("links[{k}]{dot}{key}"), problem)
 }
 
-/// Three finite numbers, or the defaults of a missing key.
+/// Parses three finite numbers, or returns the defaults if the key is missing.
 pub(super) fn triple(key: &str, given: &Option<Vec<Quantity>>, usual: [f64; 3]) -> Outcome<[f64; 3]> {
     let Some(given) = given else { return Ok(usual) };
     let given: Vec<f64> = given.iter().map(|x| x.0).filter(|x| x.is_finite()).collect();

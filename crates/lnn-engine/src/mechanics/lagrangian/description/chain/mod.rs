@@ -1,12 +1,12 @@
-//! Links in a system file, a chain or a tree, from the places of their joints to coordinates, parameters and formulas.
+//! Links in a system file, a chain or a tree: converts the geometry of their joints to coordinates, parameters and formulas.
 //!
-//! With the angular velocity `w` of a link in its own frame, the velocity `v` of that frame's origin, the acceleration of gravity `g` and
-//! the place `r` of the origin in the base, a rigid link of mass `m`, first moments `h = m c` and inertia `I` about the origin has
+//! Let `w` be the angular velocity of a link in its own frame, `v` the velocity of that frame's origin, `g` the acceleration of gravity and
+//! `r` the position of the origin in the base. A rigid link of mass `m`, first moments `h = m c` and inertia `I` about the origin then has
 //!
 //! `L = m v^2/2 + h.(v x w) + w.I w/2 + m g.r + h.g`,
 //!
-//! which is linear in its ten constants. From one link to the next, `w' = R^T w + q_dot z` and `v' = R^T (v + w x p)` of a joint that turns
-//! (Featherstone, "Rigid Body Dynamics Algorithms", 2008).
+//! which is linear in its ten constants. From one link to the next, a revolute joint gives `w' = R^T w + q_dot z` and `v' = R^T (v + w x
+//! p)` (Featherstone, "Rigid Body Dynamics Algorithms", 2008).
 
 mod formulas;
 mod joints;
@@ -28,36 +28,36 @@ pub use joints::turned;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Most links.
+/// Largest number of links.
 const MAX_LINKS: usize = 64;
-/// Acceleration of gravity in m/s^2 if none is given, and the speed at which dry friction is three quarters there.
+/// Default acceleration of gravity in m/s^2; next, the default speed at which dry friction reaches three quarters of its maximum.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 const COULOMB_SPEED: f64 = 0.01;
-/// Bounds of positions in m, and of velocities in rad/s or m/s, of coordinates that the file does not describe.
+/// Default bounds of coordinates that the file does not describe: positions in m, and velocities in rad/s or m/s.
 const BOUNDS: (f64, f64) = (1.0, 3.0);
 
-/// Settings that all links share.
+/// Settings shared by all links.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct ChainDescription {
-    /// How the rows are meant.
+    /// Convention of the Denavit-Hartenberg rows.
     #[cfg_attr(feature = "serde", serde(default))]
     convention: Convention,
-    /// Acceleration of gravity in the frame of the base, in m/s^2; `[0, 0, -9.81]` if left out.
+    /// Acceleration of gravity in the frame of the base, in m/s^2; by default `[0, 0, -9.81]`.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     gravity: Option<Vec<Quantity>>,
-    /// Viscous and dry friction of every joint.
+    /// `true` if every joint has viscous and dry friction.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     friction: bool,
-    /// Speed `s` of dry friction `Fc tanh(q_dot/s)`, in rad/s or m/s; 0.01 if left out.
+    /// Speed `s` of dry friction `Fc tanh(q_dot/s)`, in rad/s or m/s; by default 0.01.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     coulomb_speed: Option<Quantity>,
-    /// Inertia of every drive.
+    /// `true` if every drive has inertia.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     armature: bool,
 }
 
-/// The place of a link's frame.
+/// Position of a link's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 enum Convention {
@@ -68,7 +68,7 @@ enum Convention {
     Standard,
 }
 
-/// A link with the joint that moves it.
+/// A link and the joint that moves it.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct LinkDescription {
@@ -78,43 +78,43 @@ pub struct LinkDescription {
     /// Twist in rad.
     #[cfg_attr(feature = "serde", serde(default = "nothing", skip_serializing_if = "is_nothing"))]
     alpha: Quantity,
-    /// Offset along the joint in m; what a sliding joint adds to.
+    /// Offset along the joint in m; a prismatic joint adds its coordinate.
     #[cfg_attr(feature = "serde", serde(default = "nothing", skip_serializing_if = "is_nothing"))]
     d: Quantity,
-    /// Angle about the joint in rad; what a turning joint adds to.
+    /// Angle about the joint in rad; a revolute joint adds its coordinate.
     #[cfg_attr(feature = "serde", serde(default = "nothing", skip_serializing_if = "is_nothing"))]
     theta: Quantity,
-    /// `true` if the joint slides.
+    /// `true` if the joint is prismatic.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_false"))]
     prismatic: bool,
     /// Name, by which other links refer to it.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     name: Option<String>,
-    /// Name or number of the link that carries it, 0 for the base; the one before if left out.
+    /// Name or number of the link that carries it, 0 for the base; by default the previous link.
     #[cfg_attr(
         feature = "serde",
         serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "read::reference")
     )]
     parent: Option<String>,
-    /// Place of its origin in the frame of that link, in m.
+    /// Position of its origin in the frame of that link, in m.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     xyz: Option<Vec<Quantity>>,
-    /// Turns of its frame about the fixed axes x, y and z of the frame of that link, in this order, in rad.
+    /// Rotations of its frame about the fixed axes x, y and z of that link's frame, in this order, in rad.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     rpy: Option<Vec<Quantity>>,
-    /// Direction of the axis of the joint in its own frame; z if left out.
+    /// Direction of the joint axis in its own frame; by default z.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     axis: Option<Vec<Quantity>>,
-    /// Name or number of the link whose coordinate moves this joint too: by `ratio` times the coordinate and an offset.
+    /// Name or number of the link whose coordinate also moves this joint: by `ratio` times the coordinate plus an offset.
     #[cfg_attr(
         feature = "serde",
         serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "read::reference")
     )]
     mimic: Option<String>,
-    /// How far the joint moves for each unit of that coordinate; 1 if left out.
+    /// Motion of the joint per unit of that coordinate; by default 1.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     ratio: Option<Quantity>,
-    /// Where the joint is at the zero of that coordinate, in rad or m.
+    /// Position of the joint when that coordinate is zero, in rad or m.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     offset: Option<Quantity>,
 }
@@ -127,7 +127,7 @@ fn is_nothing(x: &Quantity) -> bool {
     x.0 == 0.0
 }
 
-/// A link with the joint that moves it, in words.
+/// A link and its joint, for display.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(Serialize))]
 pub struct ShownLink<'a> {
@@ -135,25 +135,25 @@ pub struct ShownLink<'a> {
     pub name: Option<&'a str>,
     /// Number of the link that carries it, 0 for the base.
     pub parent: usize,
-    /// `true` if its joint slides.
+    /// `true` if its joint is prismatic.
     pub prismatic: bool,
-    /// The coordinate that moves it, and how far it moves for each unit of that.
+    /// The coordinate that moves it, and its motion per unit of that coordinate.
     pub coordinate: &'a str,
     pub ratio: f64,
 }
 
-/// Symbols of the ten constants of a link, from 1: its mass, first moments and inertia about the origin of its frame.
+/// Returns the symbols of the ten constants of a link, counted from 1: its mass, first moments and inertia about the origin of its frame.
 pub fn inertia_symbols(link: usize) -> [String; 10] {
     ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"].map(|what| format!("{what}{link}"))
 }
 
-/// Symbols of the constants of a joint, from 1, that are not negative: the inertia of its drive, viscous and dry friction.
+/// Returns the symbols of the non-negative constants of a joint, counted from 1: the inertia of its drive, viscous and dry friction.
 pub fn loss_symbols(link: usize) -> [String; 3] {
     ["Ia", "Fv", "Fc"].map(|what| format!("{what}{link}"))
 }
 
 impl Description {
-    /// The chain of its links if there is nothing else; constants are at the index of their names in `parameters`.
+    /// Returns the chain of links if the description contains nothing else; constants are referred to by their index in `parameters`.
     pub(super) fn shape(&self, parameters: &BTreeMap<String, ParameterDescription>) -> Option<Shape> {
         let beside = [&self.lagrangian, &self.dissipation].into_iter().flatten().next().is_some();
         if self.links.is_empty() || beside || !self.constraints.is_empty() {
@@ -183,7 +183,7 @@ impl Description {
         })
     }
 
-    /// Its links in words, coordinates by these names.
+    /// Returns the links for display, with these names of coordinates.
     pub(super) fn shown_links<'a>(&'a self, names: &[&'a str]) -> Vec<ShownLink<'a>> {
         let shown = |(link, joint): (&'a LinkDescription, Joint)| ShownLink {
             name: link.name.as_deref(),
@@ -195,12 +195,12 @@ impl Description {
         self.links.iter().zip(self.joints().unwrap_or_default()).map(shown).collect()
     }
 
-    /// The description with its links expanded; unchanged if they are wrong, which its compilation reports.
+    /// Returns the description with its links expanded; unchanged if they contain errors, which compilation reports.
     pub fn plain(&self) -> Self {
         self.unfolded().unwrap_or_else(|_| self.clone())
     }
 
-    /// The description without links: their coordinates, parameters and formulas are expanded.
+    /// Expands the links to coordinates, parameters and formulas.
     pub(super) fn unfolded(&self) -> Result<Self, DescriptionError> {
         let fault = |key: &str, problem: String| Err(DescriptionError::new(key, problem));
         let mut plain = Self { chain: None, links: Vec::new(), ..self.clone() };
@@ -250,7 +250,7 @@ impl Description {
         if chain.friction {
             plain.dissipation = whole(losses, &self.dissipation);
         }
-        // The file's settings of a constant are used; a constant that neither a link nor a formula uses would be ignored silently.
+        // A constant in the file that neither a link nor a formula uses would be ignored silently, so it is rejected.
         let known = || plain.parameters.keys().map(String::as_str);
         let stray = |name: &&String| !plain.parameters.contains_key(*name) && !self.uses(name);
         if let Some(name) = self.parameters.keys().find(stray) {
@@ -263,7 +263,7 @@ impl Description {
         Ok(plain)
     }
 
-    /// `true` if a formula of the file contains a name.
+    /// Returns `true` if a formula of the file contains a name.
     fn uses(&self, name: &str) -> bool {
         let formulas = [&self.lagrangian, &self.dissipation].into_iter().flatten();
         let mut formulas = formulas.chain(self.definitions.values()).chain(self.constraints.values());
@@ -272,12 +272,12 @@ impl Description {
 }
 
 impl LinkDescription {
-    /// `true` if its place is given as a vector and turns, not as a row of Denavit and Hartenberg.
+    /// Returns `true` if its geometry is given by position and rotations, not by a Denavit-Hartenberg row.
     fn is_placed(&self) -> bool {
         self.xyz.is_some() || self.rpy.is_some() || self.axis.is_some()
     }
 
-    /// A coordinate that the file does not describe.
+    /// Returns the default description of a coordinate.
     fn coordinate(&self, k: usize) -> CoordinateDescription {
         let pair = |size: f64| Some([Quantity(-size), Quantity(size)]);
         CoordinateDescription {

@@ -20,12 +20,12 @@ fn close(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
 }
 
-/// Two rods that swing about level axes, of lengths `l` and masses `m` at their ends.
+/// A double pendulum with horizontal axes: rods of lengths `l` with masses `m` at their ends.
 const RODS: [(&str, f64); 8] =
     [("m1", 2.0), ("mx1", 1.4), ("Izz1", 0.98), ("m2", 0.5), ("mx2", 0.2), ("Izz2", 0.08), ("Fv2", 0.3), ("Fc2", 0.1)];
 const STATE: [&[f64]; 3] = [&[0.4, -1.1], &[0.8, 1.7], &[-0.6, 2.3]];
 
-/// Torques of these rods by the textbook's equations, angles from the direction of gravity.
+/// Torques of these rods by the textbook equations, with angles from the direction of gravity.
 fn textbook() -> Vec<f64> {
     let ([q, v, a], g) = (STATE, 9.81);
     let (l, [m1, c1], [m2, c2]) = (0.7, [2.0, 0.7], [0.5, 0.4]);
@@ -42,7 +42,7 @@ fn textbook() -> Vec<f64> {
 
 #[test]
 fn rods_by_rows_of_either_convention_move_as_the_textbook_says() {
-    // Gravity along x of the base.
+    // Gravity points along x of the base.
     let chain =
         |convention: &str| format!(r#"{{"convention": "{convention}", "gravity": [9.81, 0, 0], "friction": true}}"#);
     let modified = instance(&chain("modified"), r#"[{}, {"a": 0.7}]"#, &RODS);
@@ -53,8 +53,8 @@ fn rods_by_rows_of_either_convention_move_as_the_textbook_says() {
 
 #[test]
 fn a_pole_on_a_cart_moves_as_the_textbook_says() {
-    // Gravity pulls against the x axis of the base and of the cart, which slides along its own z axis; at q2 = 0 the pole points
-    // upwards, and it turns towards z.
+    // Gravity points against the x axis of the base and of the cart, which slides along its own z axis. At q2 = 0 the pole points upwards,
+    // and it rotates towards z.
     let links = r#"[{"prismatic": true, "d": 0.3, "alpha": "pi/2"}, {"alpha": "pi/2"}]"#;
     let masses = [("m1", 2.0), ("m2", 0.5), ("mx2", 0.2), ("Izz2", 0.08), ("Ia1", 0.25)];
     let cart = instance(r#"{"armature": true, "gravity": [-9.81, 0, 0]}"#, links, &masses);
@@ -131,7 +131,7 @@ fn what_the_file_says_is_added_and_kept() {
     assert_eq!(again.system().unwrap().parameters.len(), instance.parameters.len());
 }
 
-/// Turn about an axis of length 1, by Rodrigues' formula.
+/// Rotates about an axis of length 1, by Rodrigues' formula.
 fn turn(axis: [f64; 3], angle: f64, x: [f64; 3]) -> [f64; 3] {
     let (sine, cosine) = angle.sin_cos();
     let along: f64 = axis.iter().zip(x).map(|(a, x)| a * x).sum();
@@ -139,7 +139,7 @@ fn turn(axis: [f64; 3], angle: f64, x: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| cosine * x[i] + sine * swung[i] + (1.0 - cosine) * along * axis[i])
 }
 
-/// A link of a tree, without the rest of this crate: the values of its keys, and its mass as points.
+/// A link of a tree, independent of the rest of the crate: the values of its keys, and its mass as points.
 struct Limb {
     parent: usize,
     xyz: [f64; 3],
@@ -196,7 +196,7 @@ impl Limb {
     }
 }
 
-/// Places of all points of a tree.
+/// Positions of all points of a tree.
 fn points(limbs: &[Limb], q: &[f64]) -> Vec<(f64, [f64; 3])> {
     let place = |mut k: usize, mut x: [f64; 3]| {
         loop {
