@@ -1,5 +1,5 @@
-//! Experiments as data: runs, each a training by a configuration of its own, their records, the rows of their table; and sweeps, whose runs
-//! the user chooses.
+//! Experiments as data: their runs, each a training with its own configuration; their records and table rows; and sweeps, whose runs the
+//! user chooses.
 
 mod record;
 mod sweep;
@@ -25,7 +25,7 @@ pub struct Reported {
 }
 
 impl Reported {
-    /// Nothing.
+    /// No published numbers.
     pub const NOTHING: Self =
         Self { loss: None, instability: None, energy: None, regular_energy: None, chaotic_energy: None };
 }
@@ -39,15 +39,15 @@ pub struct Run {
     pub label: String,
     /// Position on the horizontal axis of a scan.
     pub abscissa: Option<f64>,
-    /// Line it belongs to in comparisons of several groups (method of regularization, activation).
+    /// Group it belongs to in comparisons (method of regularization, activation).
     pub group: String,
-    /// Everything that determines it.
+    /// The configuration, which determines the run completely.
     pub config: Config,
-    /// Figures that others report for its row.
+    /// Published figures for its row.
     pub reported: Reported,
 }
 
-/// A directory name from words: lower case letters, digits and single dashes.
+/// Turns words into a directory name: lower-case letters, digits and single dashes.
 pub fn slug(text: &str) -> String {
     let kept = text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
     let words: String = kept.collect();

@@ -9,24 +9,25 @@ use serde::{Deserialize, Serialize};
 pub struct Learned {
     /// Lowest validation loss, paper convention.
     pub validation_loss: f64,
-    /// Training instability, absent if no stretch of the schedule had two epochs.
+    /// Training instability, absent if every segment of the schedule has only one epoch.
     pub instability: Option<f64>,
     /// Mean scale of the coordinates: `loss * scale` is in physical units.
     pub scale: f64,
-    /// Fraction of fresh states whose mass matrix has not the signature of the exact one.
+    /// Fraction of fresh states whose mass matrix has a wrong signature.
     pub wrong_signature: f64,
     /// Mean energy error of each start of the trajectory test, absent where there is none.
     pub energy_errors: Vec<Option<f64>>,
-    /// Lyapunov exponent of the exact motion of each start times the time span of the test, absent where unknown: the
-    /// logarithm of the factor by which neighbours part.
+    /// Lyapunov exponent of the exact motion of each start times the time span of the test, absent where unknown: the logarithm of the
+    /// factor by which nearby motions diverge.
     #[serde(default)]
     pub stretching: Vec<Option<f64>>,
-    /// Starts whose learned motion reached the end of the time span.
+    /// Number of starts whose learned motion reached the end of the time span.
     pub integrated: usize,
 }
 
 impl Learned {
-    /// Energy errors of the starts whose exact motion is regular, or of the chaotic ones; starts for which this is unknown are left out.
+    /// Energy errors of the starts whose exact motion is regular or, if `regular` is `false`, chaotic; starts for which this is unknown are
+    /// skipped.
     fn energy_of(&self, regular: bool) -> impl Iterator<Item = f64> {
         let pairs = self.energy_errors.iter().zip(&self.stretching);
         pairs.filter_map(move |(error, stretching)| {
@@ -43,7 +44,7 @@ pub enum Outcome {
     Learned(Learned),
     /// No epoch gave a finite loss.
     Nothing {
-        /// Why.
+        /// The reason.
         reason: String,
     },
 }
@@ -95,9 +96,9 @@ impl RunSpread {
 pub struct Row {
     /// Label.
     pub label: String,
-    /// Runs that are finished.
+    /// Number of finished runs.
     pub runs: usize,
-    /// Runs that learned nothing.
+    /// Number of runs that learned nothing.
     pub failed: usize,
     /// Validation loss, paper convention.
     pub loss: Option<RunSpread>,
@@ -107,7 +108,7 @@ pub struct Row {
     pub normalised_loss: Option<RunSpread>,
     /// Instability in physical units.
     pub normalised_instability: Option<RunSpread>,
-    /// Fraction of states of wrong signature.
+    /// Fraction of states with a wrong signature.
     pub wrong_signature: Option<RunSpread>,
     /// Mean energy error over all starts.
     pub energy: Option<RunSpread>,
@@ -115,13 +116,13 @@ pub struct Row {
     pub regular_energy: Option<RunSpread>,
     /// Energy errors over the starts whose exact motion is chaotic.
     pub chaotic_energy: Option<RunSpread>,
-    /// Starts integrated to the end, of all.
+    /// Number of starts integrated to the end, and number of all starts.
     pub integrated: (usize, usize),
     /// The paper's figures.
     pub reported: Reported,
 }
 
-/// The table: one row per label in the order of first appearance, from runs and their records (if finished).
+/// Builds the table: one row per label in the order of first appearance, from runs and their records (if finished).
 pub fn rows(results: &[(Run, Option<Record>)]) -> Vec<Row> {
     let mut labels: Vec<&str> = Vec::new();
     for (run, _) in results {
@@ -218,7 +219,7 @@ mod tests {
         assert_eq!(gelu.reported.loss, Some(0.00738));
         assert_eq!((rows[1].runs, rows[1].failed, rows[1].loss), (1, 1, None));
         assert_eq!((rows[2].runs, rows[2].integrated), (0, (0, 0)));
-        // A record reads back from its file, even an older one without data on chaos.
+        // A record can be read back from its file, even an older one without data on chaos.
         let text = serde_json::to_string(&results[0].1).unwrap();
         let field = ",\"stretching\":[4.0,40.0]";
         assert!(text.contains(field), "{text}");

@@ -5,10 +5,10 @@ use crate::configuration::Config;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
-/// Longest part of a directory's name that is made of the choices.
+/// Largest number of letters of a directory name that come from the choices.
 const MOST_LETTERS: usize = 100;
 
-/// A key of the configuration and the values that it takes, as text.
+/// A key of the configuration and its values, as text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Variation {
     /// Path of the key, such as `penalty.lambda`.
@@ -20,7 +20,7 @@ pub struct Variation {
 impl FromStr for Variation {
     type Err = String;
 
-    /// `key=a,b,c`; commas inside of brackets, braces and quotes belong to a value.
+    /// Parses `key=a,b,c`; commas inside brackets, braces and quotes belong to a value.
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || "expected KEY=VALUE,VALUE,..".to_string();
         let (key, all) = text.split_once('=').ok_or_else(expected)?;
@@ -65,14 +65,14 @@ pub fn combinations(variations: &[Variation]) -> Vec<Choice> {
     })
 }
 
-/// The runs of configurations, each for `seeds` seeds from its own on; a row of the table has the runs of one choice.
+/// Creates the runs of the configurations, each with `seeds` consecutive seeds; all runs of one choice form one row of the table.
 pub fn sweep_runs(configurations: Vec<(Choice, Config)>, seeds: usize) -> Vec<Run> {
     let mut used: BTreeMap<String, usize> = BTreeMap::new();
     let named = configurations.into_iter().map(|(choice, config)| {
         let text = choice.iter().map(|(key, value)| format!("{key} = {value}")).collect::<Vec<_>>().join(", ");
         let label = if text.is_empty() { config.system.clone() } else { text };
         let name: String = slug(&label).chars().take(MOST_LETTERS).collect();
-        // Signs and points are lost in a name.
+        // Names omit signs and decimal points, so different choices may share a name.
         let again = used.entry(name.clone()).and_modify(|again| *again += 1).or_insert(1);
         let name = if *again == 1 { name } else { format!("{name}-{again}") };
         (name, label, config)

@@ -10,7 +10,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Place where a training begins.
+/// How a training begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Begin {
     /// From its beginning; old checkpoints are removed.
@@ -22,7 +22,7 @@ pub enum Begin {
     Either,
 }
 
-/// Checkpoints of a training. They stay until they are removed.
+/// Checkpoints of a training. They remain until they are removed.
 #[derive(Clone)]
 pub struct Checkpoints {
     files: Arc<dyn Files>,
@@ -43,18 +43,18 @@ impl fmt::Debug for Checkpoints {
 }
 
 impl Checkpoints {
-    /// Checkpoints in a directory, of a training that starts again.
+    /// Keeps checkpoints in a directory; the training starts anew.
     pub fn new(directory: &Path, every: CheckpointInterval) -> Self {
         let (files, directory) = (Arc::new(Disk), directory.to_path_buf());
         Self { files, directory, every, begin: Begin::Anew, identity: None }
     }
 
-    /// Sets where the training begins.
+    /// Sets how the training begins.
     pub fn beginning(self, begin: Begin) -> Self {
         Self { begin, ..self }
     }
 
-    /// Keeps this text in every checkpoint, instead of the configuration; it must match when the training continues.
+    /// Stores this text in every checkpoint instead of the configuration; it must match when the training is resumed.
     pub fn identified_by(self, text: String) -> Self {
         Self { identity: Some(text), ..self }
     }
@@ -64,7 +64,7 @@ impl Checkpoints {
         &self.directory
     }
 
-    /// Removes them: the training is over.
+    /// Removes the checkpoints after the training has ended.
     ///
     /// # Errors
     /// [`PipelineError::Output`] naming the directory.
@@ -73,7 +73,7 @@ impl Checkpoints {
         remove_checkpoints(self.files.as_ref(), &self.directory).map_err(cannot)
     }
 
-    /// The writer of checkpoints of a command, and the checkpoint to continue from, if any, after old ones were removed.
+    /// Returns the writer of checkpoints and the checkpoint to resume from, if any; removes old checkpoints if the training starts anew.
     ///
     /// # Errors
     /// [`PipelineError::Output`] if the directory cannot be written, [`PipelineError::Checkpoint`] if a required one is missing or belongs

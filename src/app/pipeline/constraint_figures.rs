@@ -5,8 +5,8 @@ use crate::pipeline::thresholds::{CONSTRAINT_SAMPLES, MOST_PLANES_AND_CONSTRAINT
 use crate::report::{Figure, LinePlot, Series, Trace, figure, file_part, line_plot, trace_plot, with_unit};
 use crate::rollout::{RolloutOptions, Trajectory, rollout};
 
-/// The motion of a model from a state on its constraints over some time; nothing of a model without constraints, or of a motion that does not
-/// begin.
+/// Pictures of a model's motion from a state on its constraints over some time; empty for a model without constraints, or if the motion
+/// cannot start.
 pub(crate) fn constraint_figures(
     model: &dyn EulerLagrange<f64>,
     (q, v): (&[f64], &[f64]),
@@ -29,7 +29,7 @@ pub(crate) fn constraint_figures(
         let moved = model.terms(q, v, Request::ACCELERATION, &mut terms).is_ok();
         for c in 0..names.len() {
             let (distance, length) = rows.distance(manifold, c);
-            // Exact values have no place on a logarithmic axis.
+            // A logarithmic axis cannot show zero, so errors are at least the machine epsilon.
             strays[c].push(distance.abs().max(f64::EPSILON));
             loads[c].push(if moved { terms.multipliers[c] * length } else { f64::NAN });
         }
@@ -53,7 +53,7 @@ pub(crate) fn constraint_figures(
     figures
 }
 
-/// The motion in planes of two coordinates.
+/// Draws the motion in planes of two coordinates.
 fn paths(motion: &Trajectory<f64>, names: &[String], time: &str) -> Vec<Figure> {
     let n = names.len();
     let pairs: Vec<(usize, usize)> = match n % 2 {

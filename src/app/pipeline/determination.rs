@@ -20,17 +20,17 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, Serialize)]
 pub struct Quantity {
     name: String,
-    /// `true` for a mass, a diagonal element.
+    /// `true` for a mass, that is, a diagonal element.
     #[serde(skip)]
     mass: bool,
     learned: f64,
-    /// Ends of the range; not finite where the data leave the quantity open.
+    /// Bounds of the range; not finite if the data do not determine the quantity.
     low: f64,
     high: f64,
     determined: &'static str,
 }
 
-/// Coordinates that act on each other and on no others.
+/// A group of coordinates that interact with each other and with no others.
 #[derive(Clone, Debug, Serialize)]
 pub struct Group {
     coordinates: Vec<String>,
@@ -41,20 +41,20 @@ pub struct Group {
 /// The full report.
 #[derive(Clone, Debug, Serialize)]
 pub struct Determined {
-    /// Mass matrix, friction and energy with their ranges; empty if nothing can be said.
+    /// Mass matrix, friction and energy with their ranges; empty if no range is known.
     determination: Vec<Quantity>,
-    /// The unit of mass matrix, friction and energy: `SI` with known forces, else over the mean mass of a coordinate.
+    /// The unit of mass matrix, friction and energy: `SI` with known forces, otherwise relative to the mean mass of a coordinate.
     unit: String,
-    /// Groups of coordinates that do not act on each other, if there are several: each has its own factor.
+    /// Groups of coordinates that do not interact with each other, if there are several: each has its own factor.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     groups: Vec<Group>,
-    /// The model's residuals of the accelerations of every coordinate beyond their expected error, over their size: on held-out motion, or
-    /// on the training motion if nothing was held out. Empty if the model is not finite.
+    /// For every coordinate, the part of the acceleration residuals that exceeds the expected error, relative to the size of the
+    /// acceleration: on held-out motion, or on training motion if nothing was held out. Empty if the model is not finite.
     misfit: BTreeMap<String, f64>,
-    /// Share of the held-out states that lie outside of the learned ones.
+    /// Share of the held-out states that lie outside the training states.
     #[serde(skip_serializing_if = "Option::is_none")]
     outside: Option<f64>,
-    /// Why no range is stated.
+    /// Why no ranges are reported.
     #[serde(skip_serializing_if = "Option::is_none")]
     withheld: Option<String>,
     /// Learned constants of the known part of a grey box with their ranges.
@@ -74,7 +74,7 @@ const UNIT: &str = "the unit";
 const NOT: &str = "not";
 
 impl Quantity {
-    /// A quantity that is compared with a `size`, and cannot be negative if `positive`.
+    /// Creates a quantity whose range is compared with `size`; `positive` excludes negative values.
     fn new(name: String, estimate: &Estimate, size: f64, positive: bool) -> Self {
         let Estimate { value: learned, low, high } = *estimate;
         let relative = 0.5 * (high - low) / size;
@@ -133,7 +133,8 @@ impl Determined {
         })
     }
 
-    /// Ranges of a model under constraints: changes of its mass matrix across them do not affect the motion, and are no error.
+    /// Result for a model under constraints: parts of its mass matrix across the constraints do not affect the motion, so they do not count
+    /// as errors.
     pub(crate) fn under_constraints() -> Self {
         Self {
             determination: Vec::new(),
@@ -148,8 +149,8 @@ impl Determined {
         }
     }
 
-    /// Why no mass is determined; none if one is. For one coordinate without known forces the mass is the unit, and the energy takes its
-    /// place.
+    /// Explains why no mass is determined; `None` if one is. For one coordinate without known forces the mass is the unit, and the energy
+    /// takes its place.
     pub(crate) fn no_mass(&self) -> Option<String> {
         if let Some(reason) = &self.withheld {
             return Some(format!("whether the data determine a mass is unknown: {reason}"));
@@ -163,29 +164,29 @@ impl Determined {
         found.is_none().then(|| "the data determine no mass".to_string())
     }
 
-    /// Why the motion leaves an element of the mass matrix open; none if it determines it.
+    /// Explains why the motion does not determine an element of the mass matrix; `None` if it does.
     pub(crate) fn open_mass(&self, [a, b]: [&str; 2]) -> Option<String> {
         let free = |group: &Group| !group.unit_known && group.coordinates.iter().any(|name| name == a || name == b);
         let apart = if self.groups.iter().any(free) { self.apart() } else { None };
         apart.or_else(|| self.open(&mass_name(a, b)))
     }
 
-    /// Why the motion leaves the potential open; none if it determines it, with the energy.
+    /// Explains why the motion does not determine the potential; `None` if it determines the energy.
     pub(crate) fn open_potential(&self) -> Option<String> {
         self.apart().or_else(|| self.open(ENERGY))
     }
 
-    /// Why the motion leaves the friction of a coordinate open; none if it determines it.
+    /// Explains why the motion does not determine the friction of a coordinate; `None` if it does.
     pub(crate) fn open_friction(&self, coordinate: &str) -> Option<String> {
         self.open(&friction_name(coordinate))
     }
 
-    /// Why it is unknown what the motion determines; none if it is known.
+    /// Explains why no ranges are known; `None` if they are.
     pub(crate) fn unknown(&self) -> Option<String> {
         self.withheld.as_ref().map(|reason| format!("whether the motion determines it is unknown: {reason}."))
     }
 
-    /// Why a quantity is open.
+    /// Explains why a quantity is not determined.
     fn open(&self, name: &str) -> Option<String> {
         let wide = || {
             let quantity = self.determination.iter().find(|q| q.name == name && q.determined == NOT)?;
@@ -200,12 +201,12 @@ impl Determined {
         self.unknown().or_else(wide)
     }
 
-    /// Share of the held-out states that the learned ones do not surround, if it is most of them.
+    /// Share of the held-out states that lie outside the training states, if it is most of them.
     pub(crate) fn mostly_outside(&self) -> Option<f64> {
         self.outside.filter(|share| *share > MOSTLY_OUTSIDE)
     }
 
-    /// A remark on standard error, if the data indicate friction.
+    /// A remark for standard error if the data indicate friction.
     pub fn suggestion(&self) -> Option<String> {
         if let Some(decay) = self.decay.filter(Decay::is_certain) {
             return Some(format!(
@@ -256,7 +257,7 @@ impl Determined {
         [meaning.to_string(), unit]
     }
 
-    /// Why there is no table, in a sentence.
+    /// Explains in a sentence why there is no table.
     fn nothing(&self) -> String {
         match &self.withheld {
             Some(reason) => format!("How well the data determine the model is not stated: {reason}."),
@@ -264,7 +265,7 @@ impl Determined {
         }
     }
 
-    /// A remark on groups of coordinates whose masses have a factor that no motion determines.
+    /// A remark on groups of coordinates whose masses have a common factor that the motion does not determine.
     fn apart(&self) -> Option<String> {
         let free = self.groups.iter().filter(|group| !group.unit_known);
         let free: Vec<String> = free.map(|group| group.coordinates.join(", ")).collect();
@@ -279,7 +280,7 @@ impl Determined {
         })
     }
 
-    /// A remark on held-out states that the learned ones do not surround.
+    /// A remark on held-out states outside the training states.
     fn beyond(&self) -> Option<String> {
         let share = self.outside.filter(|share| *share > MOST_OUTSIDE)?;
         Some(format!(
@@ -288,7 +289,7 @@ impl Determined {
         ))
     }
 
-    /// The ranges, or why there are none, with remarks.
+    /// The ranges with remarks, or the reason why there are none.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.heading("What the data determine");
@@ -302,7 +303,7 @@ impl Determined {
     }
 }
 
-/// Why the ranges of a model would be invalid: its residuals are not noise.
+/// Explains why ranges would be invalid, namely if the residuals are not noise.
 fn withheld(misfit: &BTreeMap<String, f64>, hold_out: &HoldOut, held_out: bool) -> Option<String> {
     let motion = if held_out { "held-out motion" } else { "the motion" };
     let Some((name, worst)) = misfit.iter().max_by(|a, b| a.1.total_cmp(b.1)) else {

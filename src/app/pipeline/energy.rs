@@ -8,21 +8,21 @@ use crate::report::{Figure, LinePlot, Series, figure, line_plot, median_of};
 use crate::rollout::{Driven, Trajectory};
 use serde::Serialize;
 
-/// Energy along held-out trajectories, means over the trajectories in the unit of the learned `L`, which is J only where
-/// forces were given: `change = work - friction + defect`.
+/// Energy balance of held-out trajectories, averaged over them, in the unit of the learned `L`, which is J only if forces were given:
+/// `change = work - friction + defect`.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Balance {
-    /// Trajectories counted.
+    /// Number of trajectories.
     pub trajectories: usize,
     /// Mean over the samples of `p.v/2`, the kinetic energy of a mechanical system.
     pub kinetic: f64,
-    /// Energy at the end of a trajectory less that at its start.
+    /// Energy at the end of a trajectory minus energy at its start.
     pub change: f64,
     /// Work of the known forces.
     pub work: f64,
-    /// Energy taken by friction.
+    /// Energy dissipated by friction.
     pub friction: f64,
-    /// Change of energy that friction and forces do not explain.
+    /// Change of energy that neither friction nor forces explain.
     pub defect: f64,
     /// Root mean square of the defect over the trajectories, since the mean may cancel.
     pub defect_rms: f64,
@@ -31,7 +31,7 @@ pub struct Balance {
     pub forced: bool,
 }
 
-/// Energy along a trajectory over its mean kinetic energy.
+/// Energy along a trajectory divided by its mean kinetic energy.
 struct EnergyPath {
     times: Vec<f64>,
     energy: Vec<f64>,
@@ -43,7 +43,7 @@ struct EnergyPath {
 }
 
 impl EnergyPath {
-    /// Evaluated at the estimated states with full windows; none if the model gives no finite energy.
+    /// Evaluates the energy at the estimated states with full windows; `None` if the model gives no finite energy.
     fn new(model: &dyn EulerLagrange<f64>, track: &RecordedTrajectory, states: &Smoothed) -> Option<Self> {
         let n = model.coordinates();
         let rows = states.interior();
@@ -74,7 +74,7 @@ impl EnergyPath {
         Some(Self { times: times.iter().map(|t| t - times[0]).collect(), energy, kinetic, expected, driven })
     }
 
-    /// Root mean square distance of the energy from the expected one.
+    /// Root mean square difference between energy and expected energy.
     fn error(&self) -> f64 {
         let squares = self.energy.iter().zip(&self.expected).map(|(a, b)| (a - b).powi(2));
         (squares.sum::<f64>() / self.energy.len() as f64).sqrt()
@@ -82,7 +82,7 @@ impl EnergyPath {
 }
 
 /// Energy along the held-out trajectory with the median energy error: that of the model, its kinetic and potential parts, and the energy
-/// expected from friction and known forces, over the mean kinetic energy. None if the model gives no finite energy.
+/// expected from friction and known forces, divided by the mean kinetic energy. `None` if the model gives no finite energy.
 pub fn energy_figure(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Figure> {
     let pairs = part.recording.tracks.iter().zip(&part.states);
     let paths: Vec<EnergyPath> = pairs.filter_map(|(track, states)| EnergyPath::new(model, track, states)).collect();
@@ -113,7 +113,7 @@ pub fn energy_figure(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Fig
     figure("energy_held_out.svg", "The energy along held-out motion", line_plot(&plot), caption)
 }
 
-/// The balance at the estimated states with full windows; none if no trajectory has such states.
+/// Computes the balance at the estimated states with full windows; `None` if no trajectory has such states.
 pub fn balance(model: &dyn EulerLagrange<f64>, part: &Split) -> Option<Balance> {
     let n = model.coordinates();
     let mut sums = Balance::default();
@@ -161,7 +161,7 @@ impl Balance {
         self.defect_rms / self.kinetic.abs()
     }
 
-    /// The balance in two lines, its parts over the mean kinetic energy.
+    /// Describes the balance in two lines, its terms divided by the mean kinetic energy.
     pub fn lines(&self) -> [String; 2] {
         let tenths = |x: f64| (1e3 * x / self.kinetic.abs()).round();
         let [change, work, friction] = [self.change, self.work, self.friction].map(tenths);

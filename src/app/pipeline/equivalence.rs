@@ -1,4 +1,4 @@
-//! How nearly a learned Lagrangian is equivalent to the exact one: the best factor and gauge, and the remaining difference.
+//! Measures how nearly a learned Lagrangian is equivalent to the exact one: best factor and gauge, and the remaining difference.
 
 use crate::lagrangian::EulerLagrange;
 use crate::names::percent;
@@ -6,18 +6,19 @@ use crate::pipeline::thresholds::EQUIVALENCE_STATES;
 use crate::symmetry::{Basis, Chart, SymmetryError, compare};
 use serde::Serialize;
 
-/// Best `learned = f(exact) + dF/dt + constant`, and the relative differences that remain.
+/// The best fit `learned = f(exact) + dF/dt + constant`, and the remaining relative differences.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Equivalence {
     /// Factor that turns the learned Lagrangian, after removing the gauge, into the exact one; for geodesics at rest, for groups that of
     /// the first one. None if it is undetermined because all states are on a mass shell.
     pub factor: Option<f64>,
-    /// Coefficients of `f`, from the first power: one, or of geodesics several.
+    /// Coefficients of `f`, starting with the first power: one, or several for geodesics.
     pub factors: Vec<f64>,
-    /// Factors of groups of coordinates that do not act on each other, taken out of the exact Lagrangian first; empty for one group.
+    /// Factors of groups of coordinates that do not interact, by which the exact Lagrangian is multiplied first; empty if there is one
+    /// group.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub group_factors: Vec<f64>,
-    /// Difference of momenta and values.
+    /// Difference of the momenta and of the Lagrangians.
     pub lagrangian: f64,
     /// Difference of the accelerations.
     pub motion: f64,
@@ -25,11 +26,11 @@ pub struct Equivalence {
     pub mass_matrix: f64,
     /// Difference of the energies.
     pub energy: f64,
-    /// States compared.
+    /// Number of states compared.
     pub states: usize,
 }
 
-/// Functions that gauge functions are made of, and how many states are compared for them.
+/// Basis of the gauge functions, and the number of states needed to compare them.
 pub(crate) fn gauge_functions(names: &[String], charts: &[Chart]) -> (Basis, usize) {
     let (basis, _) = Basis::usual(names, charts);
     let states = EQUIVALENCE_STATES.max(basis.len());
@@ -37,7 +38,7 @@ pub(crate) fn gauge_functions(names: &[String], charts: &[Chart]) -> (Basis, usi
 }
 
 impl Equivalence {
-    /// Compares at states `(states, n)`; gauge functions are over `basis`.
+    /// Compares the Lagrangians at states `(states, n)`; gauge functions are combinations of `basis`.
     ///
     /// # Errors
     /// [`SymmetryError`].
@@ -61,7 +62,7 @@ impl Equivalence {
         })
     }
 
-    /// Differences by quantity.
+    /// Returns the differences by quantity.
     pub(crate) fn differences(&self) -> [(&'static str, f64); 4] {
         [
             ("Lagrangian", self.lagrangian),
@@ -71,7 +72,7 @@ impl Equivalence {
         ]
     }
 
-    /// The differences in a line.
+    /// Describes the differences in one line.
     pub(crate) fn text(&self) -> String {
         self.differences().map(|(name, distance)| format!("{name} {}", percent(distance))).join(", ")
     }

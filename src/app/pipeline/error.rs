@@ -18,47 +18,47 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PipelineError {
-    /// Values of a configuration out of range, all of them.
+    /// Some values of a configuration are out of range; contains all of them.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     Config(Vec<ConfigError>),
-    /// Unknown system, or parameters that it does not have.
+    /// The system or one of its parameters is unknown.
     #[error(transparent)]
     System(#[from] SystemError),
-    /// States that cannot be sampled, or a flag that ended it.
+    /// States cannot be sampled, or sampling was interrupted.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
-    /// Files of recorded motion that cannot be read.
+    /// Files of recorded motion cannot be read.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// Recorded motion that cannot be learned from.
+    /// A network cannot learn from the recorded motion.
     #[error(transparent)]
     Recording(#[from] RecordingSplitError),
-    /// Recorded motion without derivatives.
+    /// Derivatives of the recorded motion cannot be estimated.
     #[error(transparent)]
     Smooth(#[from] SmoothError),
-    /// Measured accelerations requested where none were given.
+    /// Measured accelerations were requested, but there are none.
     #[error("no accelerations were given")]
     NoAccelerations,
-    /// Forces requested where a coordinate has none.
+    /// Forces were requested, but a coordinate has none.
     #[error("not every coordinate has a known force that changes")]
     NoForces,
-    /// Constraints with a mistake, that contradict each other or leave no motion, or that recorded motion does not obey.
+    /// Constraints have a mistake, contradict each other, leave no motion, or are not obeyed by the recorded motion.
     #[error("{0}")]
     Constraints(String),
-    /// A shape of the network that contradicts itself.
+    /// The shape of the network is inconsistent.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// A model to start from that has another shape than the configuration.
+    /// The starting model has another shape than the configuration.
     #[error("{place}: the model has another shape: {}", .differences.join("; "))]
     OtherShape {
         /// The model: `--from MODEL` of a configuration, or its file if that has changed since.
         place: String,
         /// Differences, in words.
         differences: Vec<String>,
-        /// `true` if the configuration is wrong, and not the file.
+        /// `true` if the mistake is in the configuration, not in the file.
         configuration: bool,
     },
-    /// A model file that cannot be read or made.
+    /// A model file cannot be read or created.
     #[error("{}: {source}", path.display())]
     Model {
         /// The file.
@@ -66,7 +66,7 @@ pub enum PipelineError {
         /// The problem.
         source: ModelFileError,
     },
-    /// A directory without a model.
+    /// The directory contains no model.
     #[error("{}: there is no {} in this directory", .0.display(), crate::pipeline::MODEL)]
     NoModel(PathBuf),
     /// Training failed.
@@ -88,10 +88,10 @@ pub enum PipelineError {
         "{0}: expected a metric of t, x, y, z or t, r, theta, phi around a centre, learned over a range of distances"
     )]
     Hole(String),
-    /// A picture that cannot be laid out.
+    /// A picture cannot be drawn on its grid.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// Work that would not fit into the machine's memory.
+    /// The work does not fit into memory.
     #[error("{work} takes {}", match needed {
         Some(needed) => format!("about {needed} of memory, {available} are available"),
         None => "more memory than can be counted".to_string(),
@@ -104,7 +104,7 @@ pub enum PipelineError {
         /// Available memory, in words.
         available: String,
     },
-    /// A file that could not be written or removed.
+    /// A file could not be written or removed.
     #[error("{}: {problem}", path.display())]
     Output {
         /// The file.
@@ -112,7 +112,7 @@ pub enum PipelineError {
         /// The problem.
         problem: String,
     },
-    /// A directory that another process works in.
+    /// Another process uses the directory.
     #[error("{}: another run is writing into this directory ({owner})", path.display())]
     Held {
         /// The directory.
@@ -120,7 +120,7 @@ pub enum PipelineError {
         /// The other process.
         owner: String,
     },
-    /// A directory that already contains a run.
+    /// The directory already contains a run.
     #[error("{}: there is {name} of another run, which is replaced on demand alone (overwrite)", path.display())]
     Taken {
         /// The directory.
@@ -128,22 +128,22 @@ pub enum PipelineError {
         /// A file of the run.
         name: String,
     },
-    /// A result that its format cannot hold.
+    /// A result cannot be represented in its file format.
     #[error("{0}")]
     Format(String),
-    /// The flag of the watch was raised while a finished model was judged.
+    /// The interrupt flag was raised while a finished model was tested.
     #[error("interrupted while the model was judged: the model is written, tables and report are not")]
     Interrupted,
-    /// An error of the model that was just learned.
+    /// A newly trained model could not be tested.
     #[error("interrupted while the model was judged: the model is kept, tables and report are not written")]
     Unjudged(Box<Unjudged>),
-    /// The tables of an experiment without finished runs.
+    /// No run of the experiment is finished.
     #[error("none of {} is finished: there are no records to make tables of", crate::names::pluralize(*total, "run", "runs"))]
     NothingFinished {
         /// Runs requested.
         total: usize,
     },
-    /// Runs of an experiment that another process works on.
+    /// Another process works on runs of the experiment.
     #[error("{} left to other processes, the first to {owner}; start again when they have ended", crate::names::pluralize(*held, "run is", "runs are"))]
     HeldRuns {
         /// Runs that other processes work on.
@@ -151,7 +151,7 @@ pub enum PipelineError {
         /// The process that works on the first of them.
         owner: String,
     },
-    /// The flag of the watch was raised while an experiment ran.
+    /// The interrupt flag was raised while an experiment ran.
     #[error("interrupted with {finished} of {} finished", crate::names::pluralize(*total, "run", "runs"))]
     InterruptedRuns {
         /// Runs that are finished.
@@ -162,12 +162,12 @@ pub enum PipelineError {
 }
 
 impl PipelineError {
-    /// A file that could not be written or removed.
+    /// Creates the error for a file that could not be written or removed.
     pub fn output(path: &Path, problem: impl fmt::Display) -> Self {
         Self::Output { path: path.to_path_buf(), problem: problem.to_string() }
     }
 
-    /// `true` if the configuration is at fault, and not data, files or the machine.
+    /// `true` if the error is in the configuration, not in data, files or the machine.
     pub fn is_configuration(&self) -> bool {
         match self {
             Self::Config(_) | Self::System(_) | Self::Network(_) | Self::NoAccelerations | Self::NoForces => true,

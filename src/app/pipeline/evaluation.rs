@@ -1,4 +1,4 @@
-//! Evaluation of a model: accelerations, trajectories and pictures against the hand-written system.
+//! Evaluation of a model: compares accelerations, trajectories and pictures with the analytical system.
 
 use crate::analysis::{
     Axis, ErrorDistribution, Grid, MassMatrixError, Portrait, StartBox, Statistics, TrajectoryRun, TrajectorySummary,
@@ -28,10 +28,10 @@ use std::collections::BTreeMap;
 pub struct Evaluation {
     /// Error of the accelerations of fresh states, one entry per coordinate.
     pub accelerations: Vec<ErrorDistribution>,
-    /// Fraction of the fresh states whose mass matrix lacks the signature of the exact one.
+    /// Fraction of the fresh states whose mass matrix has a wrong signature.
     pub wrong_signature: f64,
-    /// Error of the mass matrix, of a geodesic the metric, at rest at the positions of the fresh states; under constraints at the fresh
-    /// states themselves, within the directions that the constraints leave.
+    /// Error of the mass matrix. For geodesics, error of the metric at rest at the positions of the fresh states; under constraints, error
+    /// at the fresh states within the directions that the constraints allow.
     pub mass_matrix: MassMatrixError,
     /// Time for which the learned motion predicts the exact one, median over the starts.
     pub(crate) valid_time: Option<ValidTimes>,
@@ -39,10 +39,10 @@ pub struct Evaluation {
     pub(crate) trajectories: Vec<Motion>,
     /// Curvature, symmetries, charges and signature.
     pub(crate) physics: Physics,
-    /// Starts whose motions came to their end, of all, in words, if the flag ended the evaluation; pictures and physics may be missing then.
+    /// If the evaluation was interrupted: in words, how many motions were completed out of all; pictures and physics may be missing then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interrupted: Option<String>,
-    /// Names of the accelerations' coordinates, with the accelerations' units.
+    /// Names and units of the accelerations.
     #[serde(skip)]
     pub(crate) coordinates: Vec<String>,
     /// Units of the coordinates, each with the coordinates that have it.
@@ -94,15 +94,15 @@ pub struct EvaluationOptions {
     pub starts: usize,
     /// The bounds of the starts and the duration of the motions.
     pub span: Span,
-    /// Relative tolerance of the learned motion; the absolute one is a hundredth of it.
+    /// Relative tolerance of the learned motion; the absolute tolerance is a hundredth of it.
     pub rtol: f64,
     /// The states the model was trained on.
     pub trained: Domain<f64>,
-    /// Constraints that hold the learned motion, formulas by name; none for those of the system, if it has some.
+    /// Constraints on the learned motion, as formulas by name; `None` for the constraints of the system, if it has any.
     pub constraints: Option<BTreeMap<String, String>>,
     /// Seed of the starts.
     pub seed: u64,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
 }
 
@@ -123,7 +123,7 @@ impl EvaluationOptions {
     }
 }
 
-/// Compares a model with the system it learned. Comparisons made before the flag ended it are kept: see [`Evaluation::interrupted`].
+/// Compares a model with the system it learned. Comparisons made before an interruption are kept: see [`Evaluation::interrupted`].
 ///
 /// # Errors
 /// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`] before anything was compared.
@@ -181,13 +181,13 @@ pub fn evaluate(
     })
 }
 
-/// The trajectory test of these options.
+/// Runs the trajectory test with these options.
 fn trajectory_test(system: &SystemInstance<f64>, options: &EvaluationOptions) -> TrajectoryTest<f64> {
     let n = system.coordinates;
     let periodic = system.system.coordinates(n).iter().map(|c| c.periodic).collect();
     let Span { start, t_end, dt } = options.span.clone();
     let defaults = TrajectoryTest::new(StartBox { q: start.positions, v: start.velocities }, periodic);
-    // Steps grow with the time, and with the fifth root of the accuracy.
+    // The number of steps grows with the time and with the fifth root of the accuracy.
     let longer =
         (t_end / system.system.trajectory(n).t_end).max(1.0) * (defaults.rtol / options.rtol).max(1.0).powf(0.2);
     TrajectoryTest {
@@ -204,7 +204,8 @@ fn trajectory_test(system: &SystemInstance<f64>, options: &EvaluationOptions) ->
     }
 }
 
-/// The drawn motions, and pictures of motions and of learned functions; none after an interruption, which they would show.
+/// Returns the motions to draw, and pictures of motions and of learned functions; nothing after an interruption, which would leave them
+/// incomplete.
 fn pictures(
     system: &SystemInstance<f64>,
     (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>),
@@ -219,7 +220,7 @@ fn pictures(
     let portraits = test.portraits(exact, learned, &runs[..runs.len().min(DRAWN_STARTS)]);
     let mut figures = evaluation_figures(runs, &portraits, system);
     if learned.manifold().is_some() {
-        // A grid over coordinates would lie off the constraints, where L has no meaning.
+        // There is no grid under constraints, because its points would violate them, where L has no meaning.
         let start = runs.iter().find(|run| !run.exact.trajectory.is_empty());
         let columns = system.system.columns(system.coordinates);
         let names = (&columns[..system.coordinates], system.system.time_unit.as_ref());
@@ -234,7 +235,7 @@ fn pictures(
     Ok(if judging.is_interrupted() { Default::default() } else { (portraits, figures) })
 }
 
-/// The model whose physics is described; `portrait` is of one of its motions.
+/// Collects the model and the data whose physics is analysed.
 fn subject<'a>(
     system: &'a SystemInstance<f64>,
     network: &'a NetworkLagrangian<f64>,
@@ -254,7 +255,7 @@ fn subject<'a>(
     }
 }
 
-/// Curvature, symmetries and signature; `true` if an interruption left some out.
+/// Computes curvature, symmetries and signature; `true` if an interruption left some out.
 fn physics(subject: &Subject<'_>, is_free: bool, judging: &Judging<'_>) -> Result<(Physics, bool), PipelineError> {
     let mut physics = if is_free { Physics::nothing(subject) } else { Physics::under_constraints(subject) };
     let found = if is_free { physics.find(subject, &|| judging.check()) } else { judging.check() };
@@ -268,7 +269,7 @@ fn physics(subject: &Subject<'_>, is_free: bool, judging: &Judging<'_>) -> Resul
     }
 }
 
-/// The learned motion under its constraints: these formulas, or those of the system.
+/// The learned motion under constraints: those given as formulas, or those of the system.
 fn constrained<'a>(
     system: &SystemInstance<f64>,
     network: &'a NetworkLagrangian<f64>,
@@ -286,7 +287,7 @@ fn constrained<'a>(
     }
 }
 
-/// The first sample outside the states a model was trained on.
+/// Describes the first sample outside the states that the model was trained on.
 fn leaving(trajectory: &Trajectory<f64>, trained: &Domain<f64>, columns: &[String]) -> Option<String> {
     (0..trajectory.len()).find_map(|k| {
         let (q, v) = trajectory.state(k);
@@ -378,7 +379,7 @@ fn grid_states(system: &SystemInstance<f64>) -> Result<([Vec<f64>; 2], [Axis; 2]
     Ok(([[middle.clone(), rest].concat(), [middle, fast].concat()], axes))
 }
 
-/// The factor of `det M` that follows from those of the coordinates.
+/// Computes the factor of `det M` from those of the coordinates.
 fn determinant_factor(factors: &[f64]) -> Fit {
     let (product, first) = (factors.iter().product(), factors.first().copied().unwrap_or(1.0));
     let words = match factors.len() {
@@ -407,7 +408,7 @@ fn fixed(system: &SystemInstance<f64>, state: &[f64], axes: [Axis; 2], imposed: 
         }
         let value = match shell {
             Some(shell) if shell == k => "by the mass shell".to_string(),
-            // Four decimals; adding 0 turns -0 into 0.
+            // Rounds to four decimals; adding 0 turns -0 into 0.
             _ => format!("= {} {}", (1e4 * x).round() / 1e4 + 0.0, units[k]),
         };
         match groups.last_mut() {
@@ -464,7 +465,7 @@ mod tests {
             assert_eq!(part.accelerations[0].median, whole.accelerations[0].median);
             assert_eq!(part.mass_matrix.factor, whole.mass_matrix.factor);
             assert!(part.trajectories.iter().all(|motion| motion.summary.stopped.is_none()));
-            // It has its tables.
+            // The finished parts have their tables.
             let report = part.report(Report::new("part").findings(&part.headline("oscillator"))).to_html();
             assert!(report.contains("interrupted") && !part.findings("oscillator").parts().is_empty());
         }

@@ -13,7 +13,7 @@ use crate::report::{Figure, Report, with_unit};
 use serde::Serialize;
 use std::fmt::Write as _;
 
-/// Shown where there is no finite number.
+/// Shown if there is no finite number.
 const NONE: &str = "-";
 
 /// Contents of `evaluation.json`.
@@ -73,7 +73,7 @@ impl Evaluation {
         findings
     }
 
-    /// The difference from the exact Lagrangian, if there is one.
+    /// Adds the difference from the exact Lagrangian, if it was computed.
     fn add_difference(&self, findings: &mut Findings) {
         let Some(found) = &self.physics.equivalence else { return };
         let powers: Vec<String> = found.factors.iter().map(|factor| number(*factor)).collect();
@@ -86,7 +86,7 @@ impl Evaluation {
             .table(&header, [row]);
     }
 
-    /// Errors of accelerations; with their unit in the header if all of them have the same.
+    /// Adds the errors of the accelerations; the header shows the unit if all have the same.
     fn add_accelerations(&self, findings: &mut Findings) {
         let units: Vec<&str> = self.coordinates.iter().map(|name| headline::named(name).1).collect();
         let unit = units.first().filter(|unit| units.iter().all(|other| other == *unit));
@@ -101,7 +101,7 @@ impl Evaluation {
         findings.heading("Error of accelerations on fresh states").table(&header, accelerations);
     }
 
-    /// Errors of the mass matrix.
+    /// Adds the errors of the mass matrix.
     fn add_mass_matrix(&self, findings: &mut Findings) {
         let MassMatrixError { factor, error: m, .. } = &self.mass_matrix;
         let matrix = [m.mean, m.median, m.p99, m.max].map(percentage);
@@ -110,7 +110,7 @@ impl Evaluation {
         findings.table(&["factor [1]", "mean [%]", "median [%]", "99 % below [%]", "max [%]", "failed"], [matrix]);
     }
 
-    /// The trajectory test.
+    /// Adds the results of the trajectory test.
     fn add_trajectories(&self, findings: &mut Findings) {
         let unit = &self.time_unit;
         let mut header = vec!["start".to_string(), with_unit("until", unit), with_unit("valid", unit)];
@@ -139,7 +139,7 @@ impl Evaluation {
         let t = &motion.summary;
         let valid = format!("{}{}", number(t.valid.time), if t.valid.at_least { "+" } else { "" });
         let mut row = vec![(k + 1).to_string(), format!("{:.1}", t.compared_until), valid];
-        // Among coordinates with the same unit, the worst.
+        // For each unit, shows the coordinate with the largest error.
         for (_, members) in &self.units {
             let worst = |errors: &[Statistics], part: fn(&Statistics) -> f64| {
                 members.iter().filter_map(|&i| errors.get(i)).map(part).fold(f64::NAN, f64::max)
@@ -158,19 +158,19 @@ impl Evaluation {
         row
     }
 
-    /// Headline and tables, of a model of the system called `title`.
+    /// Headline and tables for a model of the system `title`.
     pub fn findings(&self, title: &str) -> Findings {
         let mut findings = self.headline(title);
         findings.append(self.tables());
         findings
     }
 
-    /// The headline, about the system called `title`.
+    /// Headline for a model of the system `title`.
     pub(crate) fn headline(&self, title: &str) -> Findings {
         headline::of_evaluation(title, self).findings()
     }
 
-    /// Pictures for a report, of the motion first.
+    /// Adds the pictures to a report, those of the motion first.
     pub(crate) fn pictures(&self, report: Report) -> Report {
         let of_motion = |figure: &&Figure| !["lagrangian", "det_"].iter().any(|word| figure.file.starts_with(word));
         let (motion, functions): (Vec<&Figure>, Vec<&Figure>) = self.figures.iter().partition(of_motion);
@@ -179,7 +179,7 @@ impl Evaluation {
             .section("The learned functions beside the exact ones", functions.into_iter().chain(&self.physics.figures))
     }
 
-    /// Tables for a report.
+    /// Adds the tables to a report.
     pub(crate) fn report(&self, report: Report) -> Report {
         self.physics.report(report.findings(&self.tables()))
     }

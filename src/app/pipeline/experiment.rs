@@ -16,12 +16,12 @@ use crate::training::{StopReason, TrainingError};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// A set of trainings with one table: its name, and its additions to the runs and to the report.
+/// A set of trainings with a common table; implementations define its name, and what it adds to the runs and to the report.
 pub trait Experiment: Sync {
     /// Name in lists and messages.
     fn name(&self) -> &str;
 
-    /// Command that performs it.
+    /// Command that runs the experiment.
     fn command(&self) -> Command {
         Command::Experiment
     }
@@ -29,7 +29,7 @@ pub trait Experiment: Sync {
     /// Title of its report.
     fn title(&self) -> &str;
 
-    /// Name of the size that its runs have, if it has several.
+    /// Name of the size of its runs, if there are several sizes.
     fn scale(&self) -> Option<&str> {
         None
     }
@@ -39,12 +39,12 @@ pub trait Experiment: Sync {
         false
     }
 
-    /// Starts of the trajectory test of a run, and the fraction of the system's time span that it covers.
+    /// Number of starts of the trajectory test of a run, and the fraction of the system's time span that the test covers.
     fn trajectories(&self) -> (usize, f64) {
         (STARTS, 1.0)
     }
 
-    /// Names of the tables that it writes in addition to those of all experiments.
+    /// Names of additional tables.
     fn tables(&self) -> &[&str] {
         &[]
     }
@@ -54,7 +54,7 @@ pub trait Experiment: Sync {
         &[]
     }
 
-    /// Examines the model that a run has learned, on `threads` threads, and writes the results into the directory of the run.
+    /// Analyses the model that a run learned, on `threads` threads, and writes the results into the directory of the run.
     ///
     /// # Errors
     /// Any error that ends the work on all runs.
@@ -74,7 +74,7 @@ pub trait Experiment: Sync {
         vec!["Instability: of the training loss without the penalty.".to_string()]
     }
 
-    /// Its additions to the headline, the loss curves and the table of all experiments; its own tables are written here.
+    /// Adds to the headline, the loss curves and the table; also writes the experiment's own tables.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -108,7 +108,7 @@ pub fn run_experiment(
 }
 
 /// Writes table, pictures and report from the records in a directory alone, without running anything. The same records give the same bytes,
-/// whatever machines made them.
+/// independent of the machines that ran the experiment.
 ///
 /// # Errors
 /// [`PipelineError::NothingFinished`]; files that cannot be written.
@@ -176,7 +176,7 @@ pub fn finish_runs(
     }
 }
 
-/// The record of a run: the existing one if it was made from the same configuration, or a new one; `None` if it was interrupted.
+/// Returns the record of a run: an existing one of the same configuration, or a new one; `None` if the run was interrupted.
 fn one(
     run: &Run,
     of: &dyn Experiment,
@@ -195,7 +195,7 @@ fn one(
     }
 }
 
-/// Makes the record of a run; `None` if it was interrupted.
+/// Performs a run and returns its record; `None` if it was interrupted.
 fn make(
     run: &Run,
     experiment: &dyn Experiment,
@@ -210,7 +210,7 @@ fn make(
     let system = run.config.system()?;
     let (starts, span) = experiment.trajectories();
     let began = Instant::now();
-    // A run that was stopped continues from its checkpoint.
+    // An interrupted run resumes from its checkpoint.
     let checkpoints = Some(output.checkpoints().beginning(Begin::Either));
     let options = RunOptions { threads, starts, span, checkpoints };
     let watch = watch.remarks_alone();
@@ -248,16 +248,16 @@ fn make(
     Ok(Some(record))
 }
 
-/// Record of a run in a directory, or the reason why there is none.
+/// Record of a run in a directory, or the reason for its absence.
 #[derive(Debug)]
 pub enum KeptRecord {
-    /// Nothing: the run is not finished.
+    /// The run is not finished.
     Nothing,
-    /// A record that was made from its configuration.
+    /// A record of the same configuration.
     Finished(Record),
     /// A record of another configuration.
     OtherConfiguration,
-    /// A file that cannot be read, and why.
+    /// A file that cannot be read, with the reason.
     Damaged(&'static str, String),
 }
 
@@ -272,7 +272,7 @@ fn finished_record(store: &ExperimentDirectory, run: &Run) -> Result<Option<Reco
     })
 }
 
-/// Record of a run in a directory, or the reason why there is none.
+/// Reads the record of a run in a directory, or returns the reason for its absence.
 ///
 /// # Errors
 /// A configuration that TOML cannot hold.

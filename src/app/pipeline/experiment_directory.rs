@@ -7,7 +7,7 @@ use crate::training::CheckpointInterval;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Directory of an experiment, created when something is written.
+/// Directory of an experiment, created when a file is first written.
 #[derive(Clone, Debug)]
 pub struct ExperimentDirectory {
     path: PathBuf,
@@ -52,7 +52,7 @@ impl ExperimentDirectory {
     }
 }
 
-/// A directory that no other process works in.
+/// A locked directory, in which no other process works.
 #[derive(Debug)]
 pub struct LockedDirectory {
     directory: Directory,
@@ -74,7 +74,7 @@ impl LockedDirectory {
         }
     }
 
-    /// Creates the directory if needed, locks it, and removes remains of killed writers.
+    /// Creates the directory if needed, locks it, and removes temporary files of killed processes.
     fn open(path: &Path) -> Result<Self, PipelineError> {
         let directory = Directory::create(path)?;
         let held = |owner: Option<LockOwner>| {

@@ -10,7 +10,7 @@ use crate::pipeline::{Output, PipelineError, Watch, headline};
 use crate::report::{DataTable, Figure, Report, experiment_table, experiment_view, loss_figures};
 use std::time::Instant;
 
-/// Runs with their records, as far as they are finished.
+/// Runs with their records; unfinished runs have none.
 pub type Results = Vec<(Run, Option<Record>)>;
 
 /// An experiment after its files were written.
@@ -20,7 +20,7 @@ pub struct ExperimentReport {
     pub results: Results,
     /// The table of `table.csv`.
     pub table: DataTable,
-    /// Runs that are finished.
+    /// Number of finished runs.
     pub finished: usize,
     /// Seconds of training of all runs.
     pub training_seconds: f64,
@@ -28,21 +28,21 @@ pub struct ExperimentReport {
     pub findings: Findings,
 }
 
-/// More of a report.
+/// Extends a report.
 pub type Part = Box<dyn FnOnce(Report) -> Report>;
 
 /// What an experiment adds to its report.
 #[derive(Default)]
 pub struct Additions {
-    /// Behind the title on a terminal.
+    /// Text after the title on a terminal.
     pub subtitle: String,
     /// Paragraphs below the headline.
     pub introduction: Vec<String>,
     /// Pictures of all runs, after the loss curves.
     pub figures: Vec<Figure>,
-    /// A part above the table of the report.
+    /// Section above the table of the report.
     pub above: Option<Part>,
-    /// A part below the table and its remarks.
+    /// Section below the table and its remarks.
     pub below: Option<Part>,
     /// Tables below the remarks on a terminal.
     pub tables: Findings,
@@ -53,7 +53,7 @@ const CONVENTIONS: &str = "Losses are the paper's: half the mean absolute error 
                            they are physical. Several runs: mean [lowest, highest]. Wrong signature: share of the fresh \
                            states. Integrated: starts of the trajectory test whose learned motion reached its end.";
 
-/// A report with an additional part, if there is one.
+/// Adds a section to a report, if there is one.
 fn with(report: Report, part: Option<Part>) -> Report {
     match part {
         Some(part) => part(report),

@@ -6,7 +6,7 @@ pub const MODEL: &str = "model.safetensors";
 pub const CAPTIONS: &str = "captions.json";
 /// Name of the interactive page of a model.
 pub const PLAY: &str = "play.html";
-/// Name of the file that a finished run of an experiment has.
+/// Name of the file that marks a finished run of an experiment.
 pub const RECORD: &str = "record.json";
 /// Name of the file with the figures of a run.
 pub const SUMMARY: &str = "summary.json";

@@ -12,19 +12,19 @@ use crate::recording::survey::{Survey, SurveyOptions, survey};
 use crate::recording::{ColumnGuess, LoadedRecording, RecordedTrajectory, Recording};
 use serde::{Serialize, Serializer};
 
-/// What to do next with recorded motion.
+/// The recommended next step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NextStep {
-    /// Mend the data: nothing can learn from them.
+    /// Correct the data, because no model can learn from them.
     Mend,
-    /// Record other motion: nothing accelerates.
+    /// Record other motion, because nothing accelerates.
     Record,
     /// Fit equations of first order by another tool, or record motion under other forces: the velocities follow from the positions.
     FirstOrder,
-    /// Take the formula that explains the motion, or search on for one if the search ended at its limit of time.
+    /// Use the formula that explains the motion; if the search reached its time limit, search for longer.
     Formula,
-    /// Learn a network under the constraints that hold the motion.
+    /// Learn a network under the constraints that were found.
     FitConstrained,
     /// Learn a network.
     Fit,
@@ -38,18 +38,18 @@ pub struct FirstLook {
     /// The survey.
     #[serde(flatten)]
     pub survey: Survey,
-    /// Why no fit can learn from the data, if none can.
+    /// Why a fit cannot learn from the data; `None` if it can.
     pub obstacle: Option<String>,
-    /// Samples in which constraints and a formula were sought.
+    /// Number of samples in which constraints and a formula were sought.
     pub searched: usize,
     /// Constraints that the motion obeys; none if they were not sought.
     pub constraints: Option<FoundConstraints>,
     /// The formula that explains the motion, if one of the small ones does.
     #[serde(serialize_with = "text_of")]
     pub formula: Option<FoundFormula>,
-    /// `true` if the search for a formula ended at its limit of time.
+    /// `true` if the search for a formula reached its time limit.
     pub unfinished: bool,
-    /// The advice.
+    /// The recommended next step.
     pub next: NextStep,
 }
 
@@ -94,7 +94,7 @@ impl FirstLook {
         Ok(Self { guessed, survey, obstacle, searched, constraints, formula, unfinished, next })
     }
 
-    /// The verdict, the roles of the columns, the survey, the laws, and the warnings.
+    /// Reports the verdict, the roles of the columns, the survey, the laws and the warnings.
     pub fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.line(match &self.obstacle {
@@ -119,11 +119,11 @@ impl FirstLook {
         findings
     }
 
-    /// The laws that were found, each in a sentence: use them instead of a network without prior knowledge.
+    /// Describes each law in a sentence, with the advice to use it instead of a network without prior knowledge.
     pub fn laws(&self) -> Vec<String> {
         let mut laws = Vec::new();
         if let Some(found) = &self.constraints {
-            // A single trajectory cannot distinguish the two.
+            // A single trajectory cannot distinguish a constraint from an orbit.
             let limit = match found.trajectories {
                 1 => " (a single trajectory may conserve it instead)",
                 _ => "",
@@ -149,13 +149,13 @@ impl FirstLook {
         laws
     }
 
-    /// `true` if the formula should be sought with friction: it has terms of friction, or none was found in time.
+    /// `true` if the formula should be sought with friction: it contains friction, or the search reached its time limit.
     pub fn has_friction(&self) -> bool {
         self.unfinished || self.formula.iter().flat_map(|found| &found.terms).any(|term| term.dissipation)
     }
 }
 
-/// The beginnings of the trajectories, as many samples of each as all together may have.
+/// Takes the beginnings of the trajectories, with a limited number of samples in total.
 fn part(recording: &Recording) -> Recording {
     let most = (FIRST_LOOK_SAMPLES / recording.tracks.len().max(1)).max(FIRST_LOOK_LEAST);
     let n = recording.n();
@@ -175,7 +175,7 @@ fn part(recording: &Recording) -> Recording {
     Recording { tracks, ..recording.clone() }
 }
 
-/// The constraints of motion of several coordinates; none if the search is not possible.
+/// Searches for constraints on several coordinates; `None` if the search is not possible.
 fn constraints(recording: &Recording, stop: &Cancellation) -> Result<Option<FoundConstraints>, PipelineError> {
     if recording.n() < 2 {
         return Ok(None);
@@ -187,7 +187,7 @@ fn constraints(recording: &Recording, stop: &Cancellation) -> Result<Option<Foun
     }
 }
 
-/// A formula that explains motion of few coordinates, with friction if it has some, and whether the search ran out of time.
+/// Searches for a formula of few coordinates, with friction if it helps; also returns whether the search reached its time limit.
 fn formula(recording: &Recording, stop: &Cancellation) -> Result<(Option<FoundFormula>, bool), PipelineError> {
     if recording.n() > FIRST_LOOK_COORDINATES {
         return Ok((None, false));

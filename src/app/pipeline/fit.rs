@@ -32,9 +32,9 @@ use crate::training::{Epoch, ResumeOptions, Snapshot, StopReason, Trained, resum
 /// A model of recorded motion, after its files were written.
 #[derive(Debug)]
 pub struct FitReport {
-    /// Reason for which learning ended.
+    /// Why learning ended.
     pub stop: StopReason,
-    /// What an interruption after the training of the model left out, in words.
+    /// Describes the work after the training that an interruption left out.
     pub unfinished: Option<String>,
     /// Header of the model's file.
     pub header: Header,
@@ -59,7 +59,7 @@ impl FitReport {
         let wrong = |source| PipelineError::Model { path: MODEL.into(), source };
         self.header.constrain(Box::new(&self.network as &dyn EulerLagrange<f64>)).map_err(wrong)
     }
-    /// A member that an earlier run trained; its history is not known any more.
+    /// Restores a member that an earlier run trained; its history is lost.
     pub(crate) fn restored(header: Header, network: NetworkLagrangian<f64>, hold_out: HoldOut) -> Self {
         let (stop, unfinished, others) = (StopReason::Finished, None, Vec::new());
         let (history, json, findings) = (Vec::new(), String::new(), Findings::default());
@@ -75,12 +75,12 @@ impl FitReport {
     }
 }
 
-/// Name of the force conjugate to a coordinate if the data gave it none.
+/// Default name of the force on a coordinate.
 pub fn usual_force(coordinate: &str) -> String {
     format!("{coordinate}_force")
 }
 
-/// Learns from recorded motion in the configuration's precision, judges by held-out motion, and writes everything into the output.
+/// Learns from recorded motion in the configuration's precision, tests it on held-out motion, and writes everything into the output.
 ///
 /// # Errors
 /// Configurations out of range, data that cannot be learned from, files that cannot be written;
@@ -111,14 +111,14 @@ fn fit_in<S: Scalar>(
     let start = Start::<S>::new(prepared, config)?;
     let toml = toml::to_string(config).map_err(PipelineError::format)?;
     let learned = start.learn((prepared, config, &toml), options, watch)?;
-    // Read before the new model replaces the old one and its results.
+    // Earlier members are read before the new model replaces them.
     let kept = options.checkpoints.as_ref().map_or_else(Vec::new, |kept| kept_members(kept.directory(), config));
     learned.write(output, &toml)?;
     let LearnedFit { mut trained, shot, model } = learned;
-    // Once the weights are known all numbers are doubles.
+    // From here on, all numbers are doubles.
     let ModelFile { header, weights } = model;
     let network = NetworkLagrangian::new(header.architecture.clone(), weights)?.cast::<f64>();
-    // The flag that ended the training does not end the judgement of its model.
+    // The interruption of the training does not stop the test of its model.
     let was_interrupted = watch.is_interrupted();
     let judged = JudgedFit::new(prepared, config, (&header, &network), (options.threads, watch, was_interrupted));
     let judged = judged.map_err(|error| match error {
@@ -169,7 +169,7 @@ struct Start<S: Scalar> {
     ranges: [Vec<[f64; 2]>; 2],
 }
 
-/// Result of a fit before it is judged.
+/// Result of a fit before its test.
 struct LearnedFit<S> {
     trained: Trained<S>,
     shot: Option<Fitted<S>>,
@@ -177,7 +177,7 @@ struct LearnedFit<S> {
 }
 
 impl<S: Scalar> LearnedFit<S> {
-    /// The model first, then small files; pictures come last, so that a full disk loses none of the others.
+    /// Writes the model first, then small files, then pictures, so that a full disk only loses pictures.
     fn write(&self, output: &dyn Output, toml: &str) -> Result<(), PipelineError> {
         write_model(output, &self.model)?;
         Command::Fit.write(output)?;
@@ -188,7 +188,7 @@ impl<S: Scalar> LearnedFit<S> {
 }
 
 impl<S: Scalar> Start<S> {
-    /// The states, and the network of a configuration.
+    /// Creates states and network for a configuration.
     ///
     /// # Errors
     /// Configurations out of range, data that cannot be learned from, a model of another shape, too little memory.
@@ -223,13 +223,13 @@ impl<S: Scalar> Start<S> {
         let floor = config.data.acceleration_weighting;
         data = measured.weigh(data, *targets, (floor, &architecture.scale, &around))?;
         let ranges = data.training[0].ranges();
-        // Every phase learns from the same states.
+        // All phases learn from the same states.
         data.training = vec![data.training.swap_remove(0); config.phases.len()];
         memory::require("training", training_memory(config, &architecture))?;
         Ok(Self { data, architecture, weights, ranges })
     }
 
-    /// Trains by states, then through the motion.
+    /// Trains on states, then through the motion.
     ///
     /// # Errors
     /// Checkpoints that cannot be read or written, a training that learned nothing.
@@ -285,7 +285,7 @@ impl<S: Scalar> Start<S> {
     }
 }
 
-/// Statements about a learned model.
+/// Test results and physics of a learned model.
 struct JudgedFit {
     hold_out: HoldOut,
     physics: Physics,
@@ -293,7 +293,7 @@ struct JudgedFit {
 }
 
 impl JudgedFit {
-    /// Judges by held-out motion, and reads physics off; a flag that was raised before does not end it.
+    /// Tests the model on held-out motion and analyses its physics; an earlier interruption does not stop this.
     ///
     /// # Errors
     /// [`PipelineError::Interrupted`].
@@ -329,7 +329,7 @@ impl JudgedFit {
     }
 }
 
-/// Trains the other networks of a fit with several members, and returns their reports; `unfinished` becomes what an interruption left out.
+/// Trains the other networks of a fit with several members and returns their reports; `unfinished` is set if an interruption left some out.
 fn others(
     prepared: &PreparedFit<'_>,
     config: &FitConfig,
@@ -346,7 +346,7 @@ fn others(
     Ok((members, others))
 }
 
-/// A formula of the recorded motion if the configuration requests one, and what an interruption left out.
+/// Searches for a formula if the configuration requests it; also describes what an interruption left out.
 fn formula(
     prepared: &PreparedFit<'_>,
     config: &FitConfig,
@@ -358,7 +358,7 @@ fn formula(
     }
     let options = FormulaOptions {
         friction: network.architecture().has_friction(),
-        // The network does not know the time.
+        // The network does not depend on the time.
         drive: false,
         noise: config.noise.clone(),
         units: prepared.reading.coordinate_units(),
@@ -377,7 +377,7 @@ fn formula(
     }
 }
 
-/// What held-out motion says of a model.
+/// Tests a model on held-out motion.
 ///
 /// # Errors
 /// [`PipelineError::Interrupted`].
@@ -407,7 +407,7 @@ pub(crate) fn judge(
     Ok(hold_out)
 }
 
-/// Name and checksum of everything that the fit learns from.
+/// Names and checksums of all data that the fit learns from.
 fn checksums<S: Scalar>(measured: &RecordingSplit, data: &Datasets<S>) -> Vec<(String, u32)> {
     let parts = [&measured.training, &measured.validation];
     let tracks = parts.into_iter().flat_map(|part| &part.recording.tracks);
@@ -416,10 +416,10 @@ fn checksums<S: Scalar>(measured: &RecordingSplit, data: &Datasets<S>) -> Vec<(S
     data.checksums().into_iter().chain([recorded]).collect()
 }
 
-/// Units in which the numbers of the coordinates are: those of the file in SI, otherwise `rad` for an angle and `SI`.
+/// Units of the coordinates: those of the file converted to SI, otherwise `rad` for an angle and `SI`.
 fn units(reading: &LoadedRecording) -> Vec<String> {
     let periodic = reading.recording.periodic.iter();
-    // A recording from memory names no columns.
+    // A recording from memory has no column names.
     let given = reading.coordinate_units().into_iter().chain(std::iter::repeat(String::new()));
     let unit = |(given, angle): (String, &bool)| match given.as_str() {
         "" => if *angle { "rad" } else { "SI" }.to_string(),
@@ -428,7 +428,7 @@ fn units(reading: &LoadedRecording) -> Vec<String> {
     given.zip(periodic).map(unit).collect()
 }
 
-/// Labels of axes for coordinates and velocities.
+/// Axis labels for coordinates and velocities.
 fn labels(reading: &LoadedRecording) -> Vec<String> {
     let (names, units) = (&reading.recording.coordinates, units(reading));
     let positions = names.iter().zip(&units).map(|(name, unit)| with_unit(name, unit));
@@ -439,7 +439,7 @@ fn labels(reading: &LoadedRecording) -> Vec<String> {
     positions.chain(velocities).collect()
 }
 
-/// Columns of recorded forces as a model remembers them; numbers of columns are not names, nor are formulas.
+/// Names of the force columns for the model file; column numbers and formulas are not names.
 fn named_forces(columns: &[String]) -> Vec<String> {
     let is_name = |text: &String| text.parse::<f64>().is_err() && formula_in(text).is_none();
     if columns.iter().all(is_name) { columns.to_vec() } else { Vec::new() }

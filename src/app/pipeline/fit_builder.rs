@@ -1,4 +1,4 @@
-//! A fit of recorded motion in one expression: files and columns, the choices that matter, the result.
+//! Builder for a fit of recorded motion: files, columns, settings, result.
 
 use crate::configuration::{Config, ConfigError, Data, FRICTION_UNITS, Phase, Precision};
 use crate::network::Structure;
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// A fit of recorded motion.
 ///
-/// Every choice has the default of `lnn fit`: if unsure, leave it.
+/// Every setting has the default of `lnn fit`; keep it if unsure.
 ///
 /// ```
 /// use lnn::prelude::*;
@@ -53,17 +53,17 @@ enum Source {
 }
 
 impl Fit {
-    /// A fit of a file: CSV, XLSX, NPY or NPZ.
+    /// Fits a file: CSV, XLSX, NPY or NPZ.
     pub fn new(file: impl Into<PathBuf>) -> Self {
         Self::of(Source::Files(vec![file.into()]))
     }
 
-    /// A fit of several files, each with at least one trajectory.
+    /// Fits several files, each with at least one trajectory.
     pub fn files(files: impl IntoIterator<Item = impl Into<PathBuf>>) -> Self {
         Self::of(Source::Files(files.into_iter().map(Into::into).collect()))
     }
 
-    /// A fit of motion in memory, which defines its own coordinates.
+    /// Fits motion in memory, which defines its own coordinates.
     pub fn recording(recording: Recording) -> Self {
         Self::of(Source::Memory(Box::new(LoadedRecording::from(recording))))
     }
@@ -84,25 +84,25 @@ impl Fit {
         }
     }
 
-    /// Columns of the coordinates.
+    /// Names the columns of the coordinates.
     pub fn coordinates<const N: usize>(mut self, names: [&str; N]) -> Self {
         self.columns.coords = names.map(String::from).to_vec();
         self
     }
 
-    /// Coordinates that are angles in rad.
+    /// Marks coordinates as angles in rad.
     pub fn angles<const N: usize>(mut self, names: [&str; N]) -> Self {
         self.columns.periodic = names.map(String::from).to_vec();
         self
     }
 
-    /// Column whose value distinguishes the trajectories of a file.
+    /// Names the column whose value distinguishes the trajectories of a file.
     pub fn trajectory(mut self, column: &str) -> Self {
         self.columns.trajectory = Some(column.to_string());
         self
     }
 
-    /// Changes the other meanings of columns: times, units, measured velocities.
+    /// Changes other column settings: times, units, measured velocities.
     pub fn columns(mut self, change: impl FnOnce(&mut Columns)) -> Self {
         change(&mut self.columns);
         self
@@ -113,54 +113,54 @@ impl Fit {
         Self { friction, ..self }
     }
 
-    /// Builds the signature of the mass matrix in.
+    /// Sets the structure of the network, which fixes the signature of the mass matrix.
     pub fn structure(self, structure: Structure) -> Self {
         Self { structure: Some(structure), ..self }
     }
 
-    /// Seed of the weights and of held-out trajectories.
+    /// Sets the seed of the weights and of the choice of held-out trajectories.
     pub fn seed(mut self, seed: u64) -> Self {
         self.options.seed = seed;
         self
     }
 
-    /// Changes the choices that come before the configuration: held-out share, smoothing windows, noise.
+    /// Changes the settings that apply before training: held-out share, smoothing windows, noise.
     pub fn options(mut self, change: impl FnOnce(&mut FitOptions)) -> Self {
         change(&mut self.options);
         self
     }
 
-    /// Precision of weights and arithmetic in training.
+    /// Sets the precision of weights and arithmetic in training.
     pub fn precision(self, precision: Precision) -> Self {
         Self { precision, ..self }
     }
 
-    /// Threads; results do not depend on them.
+    /// Sets the number of threads; results do not depend on it.
     pub fn threads(self, threads: usize) -> Self {
         Self { threads, ..self }
     }
 
-    /// Directory for model, tables, pictures and report, created if need be; without one nothing is written.
+    /// Sets the directory for model, tables, pictures and report, which is created if needed. By default no files are written.
     pub fn out(self, directory: impl Into<PathBuf>) -> Self {
         Self { out: Some(directory.into()), ..self }
     }
 
-    /// Replaces a run that is already in the directory, which is otherwise refused.
+    /// Allows replacing an existing run in the directory.
     pub fn overwrite(self, overwrite: bool) -> Self {
         Self { overwrite, ..self }
     }
 
-    /// Receiver of progress and remarks, with a flag that ends the fit.
+    /// Sets the receiver of progress and remarks, with its interrupt flag.
     pub fn watch(self, watch: Watch) -> Self {
         Self { watch, ..self }
     }
 
-    /// Changes any other choice of the [`FitConfig`] that suits the data.
+    /// Changes any other setting of the [`FitConfig`].
     pub fn configure(self, change: impl FnOnce(&mut FitConfig) + 'static) -> Self {
         Self { change: Box::new(change), ..self }
     }
 
-    /// Reads, learns, and judges the model by held-out motion.
+    /// Reads the data, trains the model and tests it on held-out motion.
     ///
     /// # Errors
     /// [`PipelineError`]: [`PipelineError::Data`] for files that do not fit their description, [`PipelineError::Training`] if nothing was learned.
@@ -171,7 +171,7 @@ impl Fit {
             Source::Files(files) => (read_recording(&files, &columns)?, files),
             Source::Memory(loaded) => (*loaded, Vec::new()),
         };
-        // Columns of files have the names of their headers.
+        // The columns of files are named by their headers.
         let columns = if files.is_empty() { columns } else { loaded.columns.clone() };
         let prepared = PreparedFit::new(&loaded, &options)?;
         let mut config = prepared.suggest(&FitConfig::default().training.system, precision)?;
@@ -195,7 +195,7 @@ impl Fit {
     }
 }
 
-/// Rejects settings that the recording decides, because they would have no effect.
+/// Rejects settings that the recording determines, because they would have no effect.
 fn require_decided(training: &Config, decided: Data) -> Result<(), PipelineError> {
     let refused = |field: &str| {
         let (expected, found) = ("what the recording decides".into(), "another value".to_string());

@@ -1,4 +1,4 @@
-//! The configuration of a fit, as `config.toml` holds it.
+//! The configuration of a fit, stored in `config.toml`.
 
 use crate::configuration::table::{Below, count, table};
 use crate::configuration::{Config, ConfigError, Faults, Known, Ranges as _};
@@ -129,7 +129,7 @@ pub enum FitConstraints {
     Formulas(BTreeMap<String, String>),
 }
 
-/// Constraints as a file holds them.
+/// Constraints in the form in which a file stores them.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Written {
@@ -160,22 +160,22 @@ impl From<FitConstraints> for Written {
     }
 }
 
-/// Straight lines need no mention.
+/// Linear interpolation is the default and is not written.
 fn is_linear(between: &Between) -> bool {
     *between == Between::Linear
 }
 
-/// A single network needs no mention.
+/// A single network is the default and is not written.
 fn is_one(count: &usize) -> bool {
     *count == 1
 }
 
-/// A finite number above 0.
+/// `true` for a finite positive number.
 fn positive(x: &f64) -> bool {
     x.is_finite() && *x > 0.0
 }
 
-/// Column and unit of `column=unit`.
+/// Parses `column=unit`.
 pub fn unit(text: &str) -> Option<(String, String)> {
     let (column, unit) = text.split_once('=')?;
     let (column, unit) = (column.trim(), unit.trim());
@@ -183,7 +183,7 @@ pub fn unit(text: &str) -> Option<(String, String)> {
 }
 
 impl FitColumns {
-    /// The meaning of the columns.
+    /// Converts to the meaning of the columns.
     pub fn meaning(&self) -> Columns {
         let Self { coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, .. } = self.clone();
         let units = self.units.iter().filter_map(|text| unit(text)).collect();
@@ -204,8 +204,8 @@ impl From<&Columns> for FitColumns {
 }
 
 impl FitConfig {
-    /// Takes the settings for a network beside a known part: a small one with almost no initial output, and the multiple shooting of a grey
-    /// box.
+    /// Applies the settings for a network next to a known part: a small network with almost no initial output, and the shooting settings of
+    /// a grey box.
     pub fn take_known(&mut self, known: Option<Known>) {
         let network = &mut self.training.network;
         (network.hidden, network.alpha) = (vec![RESIDUAL_WIDTH], 0.0);
@@ -214,17 +214,17 @@ impl FitConfig {
         self.shooting = self.shooting.take().map(|_| Shooting::grey_box());
     }
 
-    /// The configuration without the names of files, which may change.
+    /// Copies the configuration without file names, which may change.
     pub fn without_files(&self) -> Self {
         let mut other = self.clone();
         other.recording.files.clear();
         other
     }
 
-    /// Every value out of range, for `n` coordinates. Settings that only the data decide are not checked.
+    /// Returns every value out of range, for `n` coordinates. Settings that need the data are not checked.
     pub fn faults(&self, n: usize) -> Vec<ConfigError> {
         let mut faults = Faults::default();
-        // The training's own faults come together with the conditions on several keys.
+        // The training settings are checked together with the conditions on several keys.
         Self { training: Config::default(), ..self.clone() }.ranges("", &mut faults);
         let (time, rate) = (&self.recording.time, self.recording.rate);
         if let (Some(_), Some(rate)) = (time, rate) {
@@ -241,17 +241,17 @@ impl FitConfig {
     }
 }
 
-/// Choices of a fit that come before its configuration: the targets and the held-out data.
+/// Settings of a fit that apply before its configuration exists, such as targets and held-out data.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FitOptions {
-    /// Targets to learn from; none to take those that suit the data.
+    /// Targets to learn from; by default, those that suit the data.
     pub targets: Option<Targets>,
     /// Share of the samples that is held out to judge the model; 0: none.
     pub held_out: f64,
-    /// Length of the smoothing windows in samples, odd; none to choose it.
+    /// Length of the smoothing windows in samples, odd; by default, chosen from the data.
     pub window: Option<usize>,
-    /// Standard deviation of the noise of every coordinate, in SI units; none to estimate it.
+    /// Standard deviation of the noise of every coordinate, in SI units; by default, estimated.
     pub noise: Option<Vec<f64>>,
     /// Known forces between the samples.
     pub between: Between,
@@ -276,7 +276,7 @@ impl From<&FitConfig> for FitOptions {
 }
 
 impl FitOptions {
-    /// The same options for the division of a recording.
+    /// Converts to the options for splitting a recording.
     pub(crate) fn preparation(&self) -> PrepareOptions {
         let smoothing = SmoothOptions { window: self.window, noise: self.noise.clone(), ..SmoothOptions::default() };
         let Self { held_out, seed, between, .. } = *self;

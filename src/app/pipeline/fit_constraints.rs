@@ -13,14 +13,14 @@ use crate::recording::smooth::Smoothed;
 #[derive(Debug)]
 pub(crate) struct FitHeld {
     pub constraints: FormulaConstraints,
-    /// `true` if they were found.
+    /// `true` if they were found in the motion.
     pub found: bool,
-    /// Root mean square distance of the smoothed training positions.
+    /// Root mean square distance of the smoothed training positions from the constraints.
     pub distance: f64,
 }
 
 impl FitHeld {
-    /// The independent constraints that the options request, if any, and remarks.
+    /// Determines the independent constraints that the options request, if any, and remarks on them.
     ///
     /// # Errors
     /// [`PipelineError::Constraints`].
@@ -87,7 +87,7 @@ impl FitHeld {
         Ok((Some(Self { constraints, found, distance: f64::NAN }), remarks))
     }
 
-    /// States projected onto the constraints, and the root mean square distance of their positions.
+    /// Projects states onto the constraints; also returns the root mean square distance of their positions.
     ///
     /// # Errors
     /// [`PipelineError::Constraints`] for a state that cannot be projected.
@@ -96,7 +96,7 @@ impl FitHeld {
         set.brought_to(&manifold).map_err(PipelineError::constraints)
     }
 
-    /// Takes the distance of recorded states, and refuses constraints from which they are further away than by their noise, `(n)`.
+    /// Stores the distance of recorded states, and rejects constraints if it exceeds the noise, `(n)`.
     ///
     /// # Errors
     /// [`PipelineError::Constraints`].

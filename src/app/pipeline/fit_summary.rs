@@ -49,13 +49,14 @@ struct Summary<'a> {
     coordinates: Vec<Coordinate>,
     epochs: usize,
     weights: usize,
-    /// Loss (paper) against the accelerations the network was trained on, of the validation and the held-out part.
+    /// Loss in the paper's convention, relative to the accelerations of the training targets, on the validation set; `test_loss` is that on
+    /// the held-out set.
     validation_loss: f64,
-    /// None where nothing was held out.
+    /// `None` if nothing was held out.
     test_loss: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     shooting: Option<ShootingSummary>,
-    /// Constraints on the motion.
+    /// Constraints on the motion, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     constraints: Option<ConstraintsSummary<'a>>,
     /// Constants of the known part of a grey box.
@@ -70,7 +71,7 @@ struct Summary<'a> {
     determined: &'a Determined,
     #[serde(skip_serializing_if = "Option::is_none")]
     formula: Option<FormulaSummary<'a>>,
-    /// The networks of a fit of several.
+    /// The networks of a fit with several members.
     #[serde(skip_serializing_if = "Option::is_none")]
     members: Option<&'a Members>,
     physics: &'a Physics,
@@ -104,7 +105,7 @@ const SMOOTHING: [&str; 6] =
 
 /// A learned model with its data.
 pub(crate) struct Found<'a, S> {
-    /// Recorded motion: raw, smoothed and divided.
+    /// Recorded motion: original, smoothed and split.
     pub prepared: &'a PreparedFit<'a>,
     /// The supervised training.
     pub config: &'a Config,
@@ -114,7 +115,7 @@ pub(crate) struct Found<'a, S> {
     pub trained: &'a Trained<S>,
     /// Constants of the known part of a grey box, by name.
     pub constants: BTreeMap<String, f64>,
-    /// Multiple shooting, if there was any.
+    /// Result of multiple shooting, if it was performed.
     pub shot: Option<&'a Fitted<S>>,
     /// Predictions of held-out motion.
     pub hold_out: &'a HoldOut,
@@ -122,7 +123,7 @@ pub(crate) struct Found<'a, S> {
     pub determined: &'a Determined,
     /// A formula of the Lagrangian, if one was sought.
     pub formula: Option<&'a FoundFormula>,
-    /// The networks of a fit of several.
+    /// The networks of a fit with several members.
     pub members: Option<&'a Members>,
     /// Curvature, symmetries and signature.
     pub physics: &'a Physics,
@@ -131,7 +132,7 @@ pub(crate) struct Found<'a, S> {
 }
 
 impl<'a, S: Scalar> Found<'a, S> {
-    /// Writes `summary.json`, `report.html` and pictures, and returns the first as JSON and in words.
+    /// Writes `summary.json`, `report.html` and pictures; returns the summary as JSON, and the results in words.
     ///
     /// # Errors
     /// [`PipelineError::Output`].
@@ -236,7 +237,7 @@ impl<'a, S: Scalar> Found<'a, S> {
 }
 
 impl Summary<'_> {
-    /// Data, losses and times of the run in words, with the table of smoothing errors.
+    /// Describes data, losses and times of the run, with the table of smoothing errors.
     fn opening(&self, recording: &Recording) -> Findings {
         let mut findings = Findings::default();
         findings.heading("Data and training").line(self.learned_from());
@@ -284,7 +285,7 @@ impl Summary<'_> {
         findings
     }
 
-    /// What the network learned from.
+    /// Describes what the network learned from.
     fn learned_from(&self) -> String {
         let source = match self.targets {
             Targets::Measured => "measured accelerations",
@@ -296,7 +297,7 @@ impl Summary<'_> {
         format!("learned from {source}: {samples} of {}", pluralize(self.trajectories[0], "trajectory", "trajectories"))
     }
 
-    /// What chose the epoch, and what tested the model.
+    /// Describes which data chose the best epoch, and which tested the model.
     fn judged_on(&self, recording: &Recording) -> String {
         let [_, validation, test] = self.samples;
         match self.held_out {
@@ -308,7 +309,7 @@ impl Summary<'_> {
         }
     }
 
-    /// Losses, epochs and weights.
+    /// Describes losses, epochs and number of weights.
     fn losses(&self) -> String {
         let of = match self.targets {
             Targets::Forces => "forces, each divided by its expected error",

@@ -1,4 +1,4 @@
-//! Errors of the known forces that a learned model gives for motion that it has not seen.
+//! Errors of the forces that a learned model computes for held-out motion.
 
 use crate::data::{Dataset, force_spreads};
 use crate::lagrangian::{MechanicsError, inverse_dynamics};
@@ -30,7 +30,7 @@ impl ForceError {
         vec![self.name.clone(), number(self.rms), number(self.spread), percentage(self.nmse)]
     }
 
-    /// `true` for a force that the model does not reproduce.
+    /// `true` if the model does not reproduce the force.
     pub(crate) fn is_lost(&self) -> bool {
         self.nmse.is_nan() || self.nmse > FAILED_FORCE
     }
@@ -56,7 +56,7 @@ pub(crate) fn force_errors(
     Ok(names.iter().zip(force_spreads(held_out)).enumerate().map(one).collect())
 }
 
-/// How well the model reproduces the forces, as a sentence with a verdict.
+/// Describes in a sentence how well the model reproduces the forces.
 pub(crate) fn judged(errors: &[ForceError]) -> String {
     let lost: Vec<&str> = errors.iter().filter(|e| e.is_lost()).map(|e| e.name.as_str()).collect();
     let worst = errors.iter().map(|e| e.nmse).fold(0.0, |worst: f64, x| if x.is_nan() { x } else { worst.max(x) });

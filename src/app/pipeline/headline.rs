@@ -30,17 +30,17 @@ impl Headline {
     }
 }
 
-/// A unit after a number, with a word for a missing unit.
+/// The unit after a number, or a word if there is no unit.
 fn spoken(unit: &str) -> &str {
     if unit == "1" { "units" } else { unit }
 }
 
-/// Name and unit of `name [unit]`.
+/// Splits `name [unit]` into name and unit.
 pub(crate) fn named(text: &str) -> (&str, &str) {
     text.split_once(" [").map_or((text, ""), |(name, unit)| (name, unit.trim_end_matches(']')))
 }
 
-/// A time of valid prediction: `12.3 s`, `at least 100 s`, `8.4 Lyapunov times (12.3 s)`.
+/// Describes a time of valid prediction: `12.3 s`, `at least 100 s`, `8.4 Lyapunov times (12.3 s)`.
 fn valid_time(valid: &ValidTimes, unit: &str) -> String {
     let bound = |at_least: bool| if at_least { "at least " } else { "" };
     let plain = format!("{}{} {unit}", bound(valid.at_least), number(valid.median));
@@ -50,7 +50,7 @@ fn valid_time(valid: &ValidTimes, unit: &str) -> String {
     }
 }
 
-/// Name of a time of valid prediction, with its threshold and the number of values in the median.
+/// Names a time of valid prediction, with its threshold and the number of values in the median.
 fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
     format!(
         "Prediction valid (error below {} of the spread of the motion), median of {}",
@@ -59,7 +59,7 @@ fn valid_name(valid: &ValidTimes, [one, many]: [&str; 2]) -> String {
     )
 }
 
-/// A model of a known system, named `title`.
+/// Headline for a model of a known system, named `title`.
 pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     let mass = found.mass_matrix.error.median;
     let equivalence = found.physics.equivalence.as_ref();
@@ -105,7 +105,7 @@ pub(crate) fn of_evaluation(title: &str, found: &Evaluation) -> Headline {
     Headline { sentence, rows }
 }
 
-/// Predictions compared with the exact motion over a test of `tested`, in words.
+/// Describes predictions compared with exact motion over the time `tested`.
 fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
     let time = valid_time(valid, unit);
     let (until, tested) = (tested, format!("{} {unit}", number(tested)));
@@ -123,7 +123,7 @@ fn predicted(valid: &ValidTimes, tested: f64, unit: &str) -> String {
     }
 }
 
-/// A model of recorded motion called `name`, next to a formula of the same motion if one was sought.
+/// Headline for a model, called `name`, of recorded motion, and for a formula of the same motion if one was sought.
 ///
 /// A model is good if all hold: its predictions reach at least one period of the fastest motion, every coordinate is predicted better than
 /// at constant velocity, at most half of the held-out states lie outside the learned ones, the energy is accounted for to 10 %, and the
@@ -142,7 +142,7 @@ pub(crate) fn of_hold_out(
     Headline { sentence, ..of_network }
 }
 
-/// Weaknesses of a model, each a clause.
+/// Lists the weaknesses of a model, each as a clause.
 fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
     let mut all = Vec::new();
     if let Some(error) = found.model.last() {
@@ -178,7 +178,7 @@ fn failures(found: &HoldOut, determined: &Determined) -> Vec<String> {
     all
 }
 
-/// A sentence with a verdict and the weaknesses.
+/// Adds a verdict and the weaknesses to a sentence.
 fn with_failures(sentence: String, failures: &[String]) -> String {
     let all = failures.join("; ");
     match (sentence.strip_prefix("good: "), sentence.strip_prefix("limited: ")) {
@@ -189,7 +189,7 @@ fn with_failures(sentence: String, failures: &[String]) -> String {
     }
 }
 
-/// The network of a fit, with its `failures`.
+/// Headline for the network of a fit with these `failures`.
 fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
     let signature = || {
         let what = "Held-out states whose mass matrix has the wrong signature".to_string();
@@ -218,7 +218,7 @@ fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
         [format!("Median error {} s ahead", number(model.seconds)), of(model.median)],
         ["The same at constant velocity".to_string(), of(straight.median)],
     ]);
-    // For a single coordinate it would be the same.
+    // With a single coordinate both numbers would be equal.
     let several = found.by_coordinate.len() > 1;
     let apart = found.by_coordinate.iter().filter(|_| several).filter_map(|c| {
         let errors = [c.model.last()?, c.constant_velocity.last()?].map(|x| number(*x));
@@ -233,7 +233,7 @@ fn of_network(name: &str, found: &HoldOut, failures: &[String]) -> Headline {
     Headline { sentence: format!("{name}: {sentence}"), rows }
 }
 
-/// Prediction of held-out motion compared with constant velocity, as a sentence with a verdict.
+/// Compares predictions of held-out motion with constant velocity, in a sentence with a verdict.
 fn judged(found: &HoldOut, model: &PredictionError, straight: &PredictionError) -> String {
     let (Some(useful), true) = (&found.useful_time, model.median.is_finite()) else {
         return "bad: the learned Lagrangian fails to predict most of the motion that it has not seen.".to_string();
@@ -264,7 +264,7 @@ fn judged(found: &HoldOut, model: &PredictionError, straight: &PredictionError) 
     format!("{verdict}; {errors}")
 }
 
-/// An experiment: its best row next to the paper's best, and the number of rows below the paper.
+/// Headline for an experiment: its best row next to the paper's best, and the number of rows that are better than the paper.
 pub(crate) fn of_experiment(rows: &[Row]) -> Headline {
     let lowest = |of: fn(&Row) -> Option<f64>| {
         let known = rows.iter().filter_map(|row| Some((row, of(row).filter(|loss| loss.is_finite())?)));

@@ -1,4 +1,4 @@
-//! Evaluation of a model of recorded motion: predictions of motion that was held out, and the balance of its energy.
+//! Tests a model of recorded motion: predictions of held-out motion, and the energy balance.
 
 use crate::analysis::{
     PredictionError, Predictions, ValidTimes, Window, coordinate_errors, predict_by_constant_velocity,
@@ -26,13 +26,13 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::slice;
 
-/// Held-out motion that tests a model, and the test's settings.
+/// Held-out motion and the settings of the test.
 #[derive(Clone, Copy, Debug)]
 pub struct HoldOutOptions<'a> {
-    /// Motion that the model has not seen.
+    /// The held-out motion.
     pub part: &'a Split,
-    /// Time over which it is predicted, in s. By default 200 samples, or one period of the fastest motion if that is longer, but at most a
-    /// quarter of the shortest trajectory, not counting pieces much shorter than the others.
+    /// Prediction horizon in s. By default 200 samples, or one period of the fastest motion if that is longer, but at most a quarter of the
+    /// shortest trajectory, ignoring pieces much shorter than the others.
     pub horizon: Option<f64>,
     /// The time-like coordinate, if there is one.
     pub time: Option<usize>,
@@ -40,7 +40,7 @@ pub struct HoldOutOptions<'a> {
     pub forces: &'a [String],
     /// Units of the coordinates, for pictures.
     pub units: &'a [String],
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
 }
 
@@ -49,7 +49,7 @@ pub struct HoldOutOptions<'a> {
 pub struct UsefulTime {
     /// The time in s; 0 for a prediction that is never useful.
     pub seconds: f64,
-    /// `true` if it is useful to the end of the windows: the true time is longer.
+    /// `true` if it is useful to the end of the windows, so that the time is a lower bound.
     pub at_least: bool,
 }
 
@@ -69,28 +69,28 @@ pub struct CoordinatePredictions {
 /// Predictions of held-out motion, compared with motion at constant velocity.
 #[derive(Clone, Debug, Serialize)]
 pub struct HoldOut {
-    /// Unit of the errors of all coordinates together: `rad` of angles, `SI` of others; of both kinds each error is taken over the spread
-    /// of its coordinate's motion.
+    /// Unit of the errors over all coordinates: `rad` for angles, `SI` for others; if there are both kinds, each error is divided by the
+    /// spread of its coordinate's motion.
     pub error_unit: &'static str,
     /// Errors of the model's motion, by time ahead.
     pub model: Vec<PredictionError>,
-    /// Median time, over the windows, for which the model's motion predicts the measured one; a lower bound where the error stays small to
-    /// the end of a window. None without windows.
+    /// Median time, over the windows, for which the model's motion predicts the measured one; a lower bound if the error remains small to
+    /// the end of a window. `None` without windows.
     pub(crate) valid_time: Option<ValidTimes>,
-    /// Time for which its motion is useful. None without windows.
+    /// Time for which the model's motion is useful. `None` without windows.
     pub useful_time: Option<UsefulTime>,
     /// Period of the fastest coordinate in s, `2 pi` times the spread of its velocity over that of its acceleration; none if the motion
     /// takes longer than the trajectories, or is noise.
     pub fastest_period: Option<f64>,
     /// Errors of every coordinate at the same times ahead.
     pub by_coordinate: Vec<CoordinatePredictions>,
-    /// How many predictions failed and why, in words; empty if none did.
+    /// Number of failed predictions and the reasons, in words; empty if all succeeded.
     pub given_up: String,
     /// Errors of continuing at the velocity of the start.
     pub constant_velocity: Vec<PredictionError>,
-    /// Fraction of the held-out states whose mass matrix has not the right signature; `NaN` where nothing was held out.
+    /// Fraction of the held-out states whose mass matrix has a wrong signature; `NaN` if nothing was held out.
     pub wrong_signature: f64,
-    /// Energy along the held-out trajectories; none if the model gives no finite energy.
+    /// Energy balance of the held-out trajectories; `None` if the model gives no finite energy.
     pub(crate) energy: Option<Balance>,
     /// Errors of the known forces of a model that was trained on them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -101,12 +101,12 @@ pub struct HoldOut {
     /// The predictions.
     #[serde(skip)]
     pub(crate) predicted: HeldOutPredictions,
-    /// Coordinates that are angles, and scales of the coordinates' errors.
+    /// Which coordinates are angles, and the scales of the coordinates' errors.
     #[serde(skip)]
     pub(crate) error_scales: (Vec<bool>, Vec<f64>),
 }
 
-/// Predicts held-out motion in up to 500 windows and compares it with what was measured.
+/// Predicts held-out motion in up to 500 windows and compares it with the measurements.
 ///
 /// # Errors
 /// [`PipelineError::Interrupted`].
@@ -169,7 +169,7 @@ pub fn evaluate_hold_out(
     })
 }
 
-/// The windows to predict, whose starts satisfy the constraints of the model; of too many, evenly spaced ones.
+/// Selects the windows to predict, whose starts satisfy the constraints of the model; if there are too many, they are thinned evenly.
 fn windows(model: &dyn EulerLagrange<f64>, part: &Split, horizon: f64) -> Vec<Window> {
     let estimated = part.estimated();
     let of = |(estimate, states): (&StateEstimate<'_>, &Smoothed)| {
@@ -180,7 +180,7 @@ fn windows(model: &dyn EulerLagrange<f64>, part: &Split, horizon: f64) -> Vec<Wi
     let stride = all.len().div_ceil(MOST_WINDOWS).max(1);
     let mut windows: Vec<Window> = all.into_iter().step_by(stride).collect();
     if let Some(manifold) = model.manifold() {
-        // The prediction from a start that cannot be projected onto the constraints is given up.
+        // No prediction is possible from a start that cannot be projected onto the constraints.
         for Window { q, v, .. } in &mut windows {
             let _ = project(manifold, q, v);
         }
@@ -188,17 +188,17 @@ fn windows(model: &dyn EulerLagrange<f64>, part: &Split, horizon: f64) -> Vec<Wi
     windows
 }
 
-/// How errors of predictions are measured.
+/// Scales and units of prediction errors.
 struct ErrorMeasures<'a> {
     recording: &'a Recording,
-    /// Time of the longest predictions.
+    /// Longest prediction horizon.
     horizon: f64,
     /// Spread of the motion of every coordinate.
     spread: Vec<f64>,
-    /// Unit of the errors of every coordinate, and of all of them together.
+    /// Units of the errors of single coordinates, and of all coordinates together.
     units: Vec<&'static str>,
     unit: &'static str,
-    /// By which the errors of the coordinates are divided before they are joined.
+    /// Divisors of the coordinates' errors before they are combined.
     scales: Vec<f64>,
 }
 
@@ -215,14 +215,14 @@ impl<'a> ErrorMeasures<'a> {
         Self { recording, horizon, spread, units, unit, scales }
     }
 
-    /// Errors at `count` evenly spaced times ahead.
+    /// Computes errors at `count` evenly spaced times ahead.
     fn errors(&self, windows: &[Window], predictions: &Predictions, count: usize) -> Vec<PredictionError> {
         let times = (1..=count).map(|k| self.horizon * k as f64 / count as f64);
         let measures = (&self.recording.periodic[..], &self.scales[..]);
         times.map(|t| prediction_error(windows, predictions, measures, t)).collect()
     }
 
-    /// Errors of every coordinate at these times, of the model and of constant velocity.
+    /// Computes errors of every coordinate at these times, for the model and for constant velocity.
     fn by_coordinate(
         &self,
         windows: &[Window],
@@ -247,7 +247,7 @@ const ERROR_CAPTION: &str = "Median over the held-out windows of the error of th
 const FORCE_CAPTION: &str =
     "Known forces in the same held-out window; the prediction takes them as linear between the samples.";
 
-/// Times over which held-out motion can be predicted: from the shortest of its steps to the longest of its trajectories.
+/// Range of possible horizons: from the shortest time step to the longest trajectory.
 pub(crate) fn horizons(part: &Split) -> Option<(f64, f64)> {
     let times = || part.states.iter().map(|states| &states.times[states.interior()]);
     let spans = times().filter_map(|times| Some(times.last()? - times.first()?)).filter(|span| *span > 0.0);
@@ -273,8 +273,9 @@ fn fastest_period(part: &Split) -> Option<f64> {
     (0..n).map(of).filter(|period| *period <= longest).reduce(f64::min)
 }
 
-/// A quarter of the shortest of the long trajectories, at most [`SAMPLES_AHEAD`] samples or one `period`. Half the time belongs to trajectories of a length or
-/// longer ones; long is half as much: pieces between gaps do not shorten the horizon of the others.
+/// Default horizon: a quarter of the shortest long trajectory, but at most [`SAMPLES_AHEAD`] samples or one `period`. Trajectories count as
+/// long from half the length above which half of the recorded time lies, so that pieces between gaps do not shorten the horizon of the
+/// others.
 fn horizon(part: &Split, period: Option<f64>) -> f64 {
     let times = part.states.iter().map(|states| &states.times[states.interior()]);
     let mut spans: Vec<(f64, usize)> =
@@ -308,7 +309,7 @@ fn error_plot(curves: &[(&str, Vec<PredictionError>)], unit: &str) -> LinePlot {
     }
 }
 
-/// The window whose error at the end is the median: its coordinates, its path in the plane of polar ones, and the forces in it.
+/// Pictures of the window whose final error is the median: its coordinates, its path in the plane if coordinates are polar, and its forces.
 fn example_figures(
     plan: &HoldOutOptions<'_>,
     found: &HeldOutPredictions,
@@ -344,7 +345,7 @@ fn example_figures(
     names.iter().enumerate().filter_map(of).chain(path).chain(forces).collect()
 }
 
-/// Coordinate `i` of a window, measured and predicted; an angle in one turn if it leaves it.
+/// Plots coordinate `i` of a window, measured and predicted; an angle that leaves one turn is folded into it.
 fn example(window: &Window, predicted: &[f64], periodic: &[bool], i: usize, y_label: String) -> LinePlot {
     let column = |values: &[f64]| -> Vec<(f64, f64)> {
         values.iter().skip(i).step_by(periodic.len()).copied().zip(window.times.iter().copied()).collect()
@@ -356,7 +357,7 @@ fn example(window: &Window, predicted: &[f64], periodic: &[bool], i: usize, y_la
     LinePlot { x_label: "time ahead [s]".into(), y_label, series, turn, ..LinePlot::default() }
 }
 
-/// Forces over time, one line each.
+/// Plots forces over time, one line each.
 fn force_plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> LinePlot {
     let mut values = vec![0.0; names.len()];
     let mut columns = vec![Vec::with_capacity(times.len()); names.len()];
@@ -369,7 +370,7 @@ fn force_plot(force: &SampledForce<f64>, times: &[f64], names: &[String]) -> Lin
     LinePlot { x_label, y_label, series, ..LinePlot::default() }
 }
 
-/// Fraction of the states with full windows whose mass matrix has not the right signature, or is not finite.
+/// Fraction of the states with full windows whose mass matrix has a wrong signature or is not finite.
 fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<usize>) -> f64 {
     let n = model.coordinates();
     let (mut wrong, mut count) = (0, 0);
@@ -382,7 +383,7 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<us
         };
         let (q, v) = (some(&states.q), some(&states.v));
         for (q, v) in q.chunks(STATES_AT_ONCE * n).zip(v.chunks(STATES_AT_ONCE * n)) {
-            // Failures of single states leave matrices that are not finite.
+            // If a state fails, its matrix is not finite and is handled below.
             let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
             count += q.len() / n;
             let m = terms.constraints;
@@ -399,18 +400,18 @@ fn wrong_signature(model: &dyn EulerLagrange<f64>, part: &Split, time: Option<us
     wrong as f64 / f64::max(1.0, count as f64)
 }
 
-/// Factor by which a prediction is better than constant velocity; none if it is no better.
+/// Factor by which a prediction is better than constant velocity; `None` if it is not better.
 pub(crate) fn factor(model: &PredictionError, straight: &PredictionError) -> Option<f64> {
     is_better(model.median, straight.median).then(|| straight.median / model.median)
 }
 
-/// `true` if the error of a prediction is at least a twentieth smaller than that of constant velocity.
+/// `true` if the prediction error is at least a twentieth smaller than that of constant velocity.
 pub(crate) fn is_better(model: f64, straight: f64) -> bool {
     straight / model >= BETTER_THAN_CONSTANT_VELOCITY
 }
 
 impl UsefulTime {
-    /// Useful time from the time of valid prediction and the errors of model and constant velocity at the same times.
+    /// Determines the useful time from the time of valid prediction and from the errors of model and constant velocity at the same times.
     fn new(valid: &ValidTimes, [model, straight]: [&[PredictionError]; 2]) -> Self {
         let mut pairs = model.iter().zip(straight).rev();
         let last = pairs.next().filter(|(model, straight)| factor(model, straight).is_some());
@@ -420,7 +421,7 @@ impl UsefulTime {
     }
 }
 
-/// A unit in the brackets of a header.
+/// Short form of a unit for a header.
 fn short(unit: &str) -> &str {
     if unit.starts_with("of ") { "spread" } else { unit }
 }
@@ -439,7 +440,7 @@ impl HoldOut {
         ]
     }
 
-    /// Table of the errors by coordinate, if there are several.
+    /// Builds the table of errors by coordinate, if there are several.
     fn table_by_coordinate(&self) -> Option<(Vec<String>, Vec<Vec<String>>)> {
         if self.by_coordinate.len() < 2 || self.model.is_empty() {
             return None;
@@ -467,7 +468,7 @@ impl HoldOut {
             .collect()
     }
 
-    /// The result for a model without held-out motion, which has no numbers.
+    /// Result for a model without held-out motion; it contains no numbers.
     pub(crate) fn nothing() -> Self {
         Self {
             error_unit: "SI",
@@ -487,7 +488,7 @@ impl HoldOut {
         }
     }
 
-    /// `true` if the model predicts better than constant velocity at some time ahead; none without predictions.
+    /// `true` if the model predicts better than constant velocity at some time ahead; `None` without predictions.
     pub(crate) fn is_better(&self) -> Option<bool> {
         let mut pairs = self.model.iter().zip(&self.constant_velocity);
         (!self.model.is_empty()).then(|| pairs.any(|(model, straight)| factor(model, straight).is_some()))
@@ -498,7 +499,7 @@ impl HoldOut {
         self.wrong_signature.is_nan()
     }
 
-    /// Errors of forces and predictions, and the balance of energy.
+    /// Reports errors of forces and predictions, and the energy balance.
     pub(crate) fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         if !self.force_errors.is_empty() {

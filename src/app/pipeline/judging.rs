@@ -21,11 +21,11 @@ pub struct Unjudged {
     pub stop: StopReason,
 }
 
-/// Reports progress and honours the flag.
+/// Reports progress and checks the interrupt flag.
 #[derive(Debug)]
 pub(crate) struct Judging<'a> {
     watch: &'a Watch,
-    /// `true` if the flag counts.
+    /// `true` if the interrupt flag is respected.
     counts: bool,
     pieces: usize,
     done: AtomicU64,
@@ -33,20 +33,20 @@ pub(crate) struct Judging<'a> {
 }
 
 impl<'a> Judging<'a> {
-    /// Judging of `pieces` pieces of work. A flag that was raised earlier does not count: it ended the training.
+    /// Starts `pieces` pieces of work. A flag that was raised earlier is ignored, because it ended the training.
     pub fn new(watch: &'a Watch, pieces: usize) -> Self {
         let counts = !watch.is_interrupted();
         watch.say(Event::Judged { done: 0, total: pieces });
         Self { watch, counts, pieces, done: AtomicU64::new(0), evaluations: AtomicU64::new(0) }
     }
 
-    /// Reports that `pieces` more pieces are done.
+    /// Reports `pieces` more finished pieces.
     pub fn advance(&self, pieces: usize) {
         let done = self.done.fetch_add(pieces as u64, Ordering::Relaxed) as usize + pieces;
         self.watch.say(Event::Judged { done, total: self.pieces });
     }
 
-    /// `true` if the flag was raised meanwhile.
+    /// `true` if the flag was raised in the meantime.
     pub fn is_interrupted(&self) -> bool {
         self.counts && self.watch.is_interrupted()
     }
@@ -59,13 +59,13 @@ impl<'a> Judging<'a> {
         if self.is_interrupted() { Err(PipelineError::Interrupted) } else { Ok(()) }
     }
 
-    /// The model; once the flag is raised, it fails everywhere, which ends any integration.
+    /// Wraps a model so that it fails everywhere once the flag is raised, which ends any integration.
     pub fn watched<'b>(&'b self, model: &'b dyn EulerLagrange<f64>) -> Watched<'b> {
         Watched { model, judging: self }
     }
 }
 
-/// A model under [`Judging`].
+/// A model wrapped by [`Judging`].
 pub(crate) struct Watched<'a> {
     model: &'a dyn EulerLagrange<f64>,
     judging: &'a Judging<'a>,

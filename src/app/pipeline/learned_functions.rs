@@ -12,31 +12,31 @@ use crate::recording::Recording;
 use crate::report::{Figure, LinePlot, QuantityMap, Series, figure, file_part, line_plot, quantity_figure};
 use std::f64::consts::{PI, TAU};
 
-/// A learned model, next to the exact one if that is known.
+/// A learned model and the exact one, if that is known.
 #[derive(Clone, Copy)]
 pub(super) struct Pair<'a> {
     pub learned: &'a dyn EulerLagrange<f64>,
     pub exact: Option<&'a dyn EulerLagrange<f64>>,
     /// Factor that multiplies the learned Lagrangian.
     pub factor: f64,
-    /// Factor of every coordinate, where groups of coordinates have their own.
+    /// Factors of the coordinates, if groups of coordinates have different factors.
     pub factors: &'a [f64],
 }
 
-/// Coordinates over which pictures are drawn.
+/// Region over which pictures are drawn.
 pub(super) struct Picturing<'a> {
     /// Names of the coordinates, and labels of axes for coordinates and velocities.
     pub names: Vec<String>,
     pub labels: Vec<String>,
     /// Range of every coordinate.
     pub ranges: Vec<[f64; 2]>,
-    /// The coordinates of the axes of maps.
+    /// The two coordinates that span maps.
     pub shown: [usize; 2],
     /// Recorded positions in the plane of the axes.
     pub marks: Vec<(f64, f64)>,
     /// Sentence about the unit of the pictures; may be empty.
     pub unit: String,
-    /// What recorded motion determines.
+    /// The quantities that recorded motion determines.
     pub determined: Option<&'a Determined>,
 }
 
@@ -54,7 +54,7 @@ pub(super) fn recorded_range(recording: &Recording, i: usize) -> ([f64; 2], impl
 }
 
 impl Picturing<'_> {
-    /// The plane of recorded motion.
+    /// Chooses the plane of recorded motion.
     pub fn of_recording(self, recording: &Recording) -> Self {
         let n = recording.n();
         let (ranges, folds): (Vec<_>, Vec<_>) = (0..n).map(|i| recorded_range(recording, i)).unzip();
@@ -68,7 +68,7 @@ impl Picturing<'_> {
         Self { ranges, marks, ..self }
     }
 
-    /// The middle of the ranges.
+    /// The centre of the ranges.
     pub fn middle(&self) -> Vec<f64> {
         self.ranges.iter().map(|[low, high]| 0.5 * (low + high)).collect()
     }
@@ -81,7 +81,7 @@ impl Picturing<'_> {
         })
     }
 
-    /// Coordinates other than those of the axes, with their fixed values.
+    /// Lists the other coordinates with their fixed values.
     fn fixed(&self, free: &[usize]) -> String {
         let middle = self.middle();
         let others = (0..self.names.len()).filter(|i| !free.contains(i));
@@ -90,7 +90,7 @@ impl Picturing<'_> {
         others.map(one).collect::<Vec<_>>().join(", ")
     }
 
-    /// A map of a quantity; `file` is the beginning of the file's name, `open` why the motion does not determine it.
+    /// Draws a map of a quantity; `file` begins the file name, and `open` explains why the motion does not determine the quantity.
     pub fn map(
         &self,
         [quantity, about, file]: [String; 3],
@@ -109,7 +109,7 @@ impl Picturing<'_> {
         quantity_figure(&QuantityMap { quantity, about, file, labels, learned, exact, fixed, remark, marks, open })
     }
 
-    /// Points of a map that are far from every recorded position, and their description in words; empty without recorded motion.
+    /// Marks points of a map that are far from every recorded position, and describes them; empty without recorded motion.
     fn unseen(&self, grid: &Grid) -> (Vec<bool>, String) {
         if self.marks.is_empty() {
             return (Vec::new(), String::new());
@@ -122,13 +122,13 @@ impl Picturing<'_> {
         (open, why.to_string())
     }
 
-    /// Grid over the plane of the values that `of` gives for points `(points, n)`.
+    /// Evaluates `of` on a grid in the plane; it receives points `(points, n)`.
     fn grid(&self, points: usize, of: impl Fn(&[f64]) -> Vec<f64>) -> Grid {
         let ([x, y], q) = grid_points(&self.middle(), self.axes(points));
         Grid { x, y, values: of(&q) }
     }
 
-    /// A curve of a quantity over coordinate `i`, the others in the middle of their ranges.
+    /// Draws a quantity over coordinate `i`, with the others at the centre of their ranges.
     fn curve(
         &self,
         i: usize,
@@ -156,7 +156,7 @@ impl Picturing<'_> {
         figure(&format!("{}.svg", file_part(file)), about, line_plot(&plot), caption)
     }
 
-    /// The potential; none for a model that is constant at rest.
+    /// Draws the potential; nothing for a model that is constant at rest.
     pub fn potential(&self, pair: Pair<'_>, side: usize) -> Vec<Figure> {
         let n = self.names.len();
         let open = self.determined.and_then(Determined::open_potential);
@@ -181,7 +181,7 @@ impl Picturing<'_> {
         figures
     }
 
-    /// The relevant `components` of the mass matrix at rest; `symbol` is `M`, or `g` for a metric. The second part is the number of
+    /// Draws the relevant `components` of the mass matrix at rest; `symbol` is `M`, or `g` for a metric. Also returns the number of
     /// components without a picture.
     pub fn mass_matrix(
         &self,
@@ -226,7 +226,7 @@ impl Picturing<'_> {
         (drawn.collect(), more)
     }
 
-    /// The gyroscopic field, such as that of a magnet or a rotating frame; none for a model whose momenta vanish at rest.
+    /// Draws the gyroscopic field, such as that of a magnet or a rotating frame; nothing for a model whose momenta vanish at rest.
     pub fn gyroscopic(&self, pair: Pair<'_>, side: usize) -> Vec<Figure> {
         let n = self.names.len();
         let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j])).take(MOST_MAPS);
@@ -242,7 +242,7 @@ impl Picturing<'_> {
         drawn.collect()
     }
 
-    /// `F_ij` at points `(points, n)` by central differences of the momenta at rest.
+    /// Computes `F_ij` at points `(points, n)` by central differences of the momenta at rest.
     fn field(&self, model: &dyn EulerLagrange<f64>, q: &[f64], [i, j]: [usize; 2]) -> Vec<f64> {
         let n = self.names.len();
         let difference = |along: usize, of: usize| -> Vec<f64> {
@@ -259,8 +259,8 @@ impl Picturing<'_> {
         difference(i, j).iter().zip(difference(j, i)).map(|(a, b)| a - b).collect()
     }
 
-    /// Friction of every coordinate over its velocity, with the others at rest, in the middle of the coordinates; none for a model without
-    /// friction.
+    /// Draws the friction of every coordinate over its velocity, with the others at rest and the coordinates at the centre; nothing for a
+    /// model without friction.
     pub fn friction(&self, pair: Pair<'_>, velocities: &[[f64; 2]]) -> Vec<Figure> {
         let (n, middle) = (self.names.len(), self.middle());
         let of = |model: &dyn EulerLagrange<f64>, i: usize, v: &[f64]| -> Vec<f64> {
@@ -295,22 +295,22 @@ impl Picturing<'_> {
     }
 }
 
-/// Values of a quantity of a model at points `(points, n)`.
+/// Evaluates a quantity of a model at points `(points, n)`.
 type Value<'a> = &'a dyn Fn(&dyn EulerLagrange<f64>, &[f64]) -> Vec<f64>;
 
 fn lines_over(x_label: &str, y_label: &str, series: Vec<Series>) -> LinePlot {
     LinePlot { x_label: x_label.to_string(), y_label: y_label.to_string(), series, ..LinePlot::default() }
 }
 
-/// Sentences in a line, without empty ones.
+/// Joins sentences, without empty ones.
 fn sentences(all: &[&str]) -> String {
     all.iter().filter(|text| !text.is_empty()).copied().collect::<Vec<_>>().join(" ")
 }
 
-/// Terms at rest at points `(points, n)`.
+/// Evaluates terms at rest at points `(points, n)`.
 fn at_rest(model: &dyn EulerLagrange<f64>, q: &[f64], request: Request) -> Terms<f64> {
     let mut terms = Terms::default();
-    // Failures of single states leave numbers that are not finite.
+    // If a state fails, its numbers are not finite.
     let _ = model.terms(q, &vec![0.0; q.len()], request, &mut terms);
     terms
 }
@@ -319,7 +319,7 @@ fn potential(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Vec<f64> {
     at_rest(model, q, Request::LAGRANGIAN).lagrangian.iter().map(|l| -l).collect()
 }
 
-/// A learned potential brought to the mean of the exact one, or to the minimum 0: its constant has no meaning.
+/// Shifts a learned potential to the mean of the exact one, or to the minimum 0, because its constant has no meaning.
 fn aligned(learned: Vec<f64>, exact: Option<Vec<f64>>) -> (Vec<f64>, Option<Vec<f64>>) {
     let finite = |values: &[f64]| values.iter().copied().filter(|x| x.is_finite()).collect::<Vec<_>>();
     let lowest = |values: &[f64]| finite(values).into_iter().fold(f64::INFINITY, f64::min);

@@ -1,4 +1,4 @@
-//! Losses of weights that do not come from the supervised training.
+//! Losses of weights that do not result from supervised training.
 
 use crate::configuration::Penalty;
 use crate::data::Dataset;
@@ -7,7 +7,7 @@ use crate::pipeline::PipelineError;
 use crate::scalar::Scalar;
 use crate::training::{Objective, Trained, TrainingError};
 
-/// States on which losses are reported: those that chose the best epoch, and fresh ones.
+/// States on which losses are reported: validation states and fresh ones.
 pub(crate) struct LossStates<S> {
     /// Validation states.
     pub validation: Dataset<S>,
@@ -16,7 +16,7 @@ pub(crate) struct LossStates<S> {
 }
 
 impl<S: Scalar> LossStates<S> {
-    /// Puts the losses of the present weights into `trained`, replacing those of its training.
+    /// Replaces the losses in `trained` by those of the present weights.
     ///
     /// # Errors
     /// [`TrainingError::Threads`] if threads cannot be started.
@@ -29,7 +29,7 @@ impl<S: Scalar> LossStates<S> {
     ) -> Result<(), PipelineError> {
         let mut objective = Objective::new(architecture, penalty, threads).map_err(TrainingError::from)?;
         let loss = objective.loss(&trained.weights, &self.validation).loss.to_f64();
-        // A model file needs a number, even if the weights give no state an acceleration.
+        // A model file needs a finite number, even if no state has an acceleration.
         trained.validation_loss = if loss.is_finite() { loss } else { f64::MAX };
         trained.test = objective.loss(&trained.weights, &self.test);
         Ok(())

@@ -30,24 +30,24 @@ pub struct Member {
     pub seed: u64,
     /// Errors of its motion, by time ahead.
     pub errors: Vec<PredictionError>,
-    /// The factor by which its Lagrangian becomes that of the first member, up to a total derivative, and the remaining difference; none
+    /// The factor that turns its Lagrangian into that of the first member, up to a total derivative, and the remaining difference; `None`
     /// for the first, and if Lagrangians are not compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub comparison: Option<Equivalence>,
 }
 
-/// The networks of a fit, in one gauge, and how far they agree at held-out states.
+/// The networks of a fit in a common gauge, and their agreement at held-out states.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Members {
     /// The networks, that of the fit first.
     pub each: Vec<Member>,
     /// Errors of the mean of their predictions, by time ahead; empty if they did not predict the same windows.
     pub mean: Vec<PredictionError>,
-    /// Standard deviation of the entries of the mass matrix between members, root mean square over entries and states, each entry over the
-    /// roots of the two masses of its row and column; none if Lagrangians are not compared.
+    /// Standard deviation of the mass matrix between members: root mean square over entries and states, each entry divided by the square
+    /// roots of the two diagonal entries of its row and column; `None` if Lagrangians are not compared.
     pub mass_matrix_spread: Option<f64>,
-    /// Standard deviation of the energy at rest between members, less its mean over the states, root mean square over the states, over the
-    /// spread of the mean energy at rest; none if Lagrangians are not compared, or have no potential.
+    /// Standard deviation between members of the energy at rest, less its mean over the states: root mean square over the states, divided
+    /// by the spread of the mean energy at rest; `None` if Lagrangians are not compared, or have no potential.
     pub potential_spread: Option<f64>,
     /// Why Lagrangians are not compared; empty if they are.
     #[serde(skip_serializing_if = "String::is_empty")]
@@ -123,7 +123,7 @@ impl Members {
         Ok(Some((found, others)))
     }
 
-    /// Brings the Lagrangians into the gauge of the first and compares them at held-out states.
+    /// Converts the Lagrangians to the gauge of the first and compares them at held-out states.
     fn compare(
         &mut self,
         prepared: &PreparedFit<'_>,
@@ -140,7 +140,7 @@ impl Members {
             q.extend_from_slice(&states.q[rows.start * n..rows.end * n]);
             v.extend_from_slice(&states.v[rows.start * n..rows.end * n]);
         }
-        // If there are more states than needed, evenly spaced ones.
+        // If there are more states than needed, they are thinned evenly.
         let stride = (q.len() / n / states).max(1);
         let [q, v] = [q, v].map(|all| all.chunks_exact(n).step_by(stride).flatten().copied().collect::<Vec<f64>>());
         let first: &dyn EulerLagrange<f64> = networks[0];
@@ -196,7 +196,7 @@ impl Members {
         vec![meaning.to_string(), format!("spread between the members there: {known}")]
     }
 
-    /// The members side by side.
+    /// Reports the members side by side.
     pub(crate) fn findings(&self) -> Findings {
         let mut findings = Findings::default();
         findings.heading("Members, trained from different seeds");
@@ -205,7 +205,7 @@ impl Members {
     }
 }
 
-/// Models of the members that an interrupted fit of the same configuration trained in a directory, from the second on.
+/// Reads the members, from the second on, that an interrupted fit of the same configuration trained in a directory.
 pub(crate) fn kept_members(directory: &Path, config: &FitConfig) -> Vec<ModelFile<f64>> {
     #[derive(Deserialize)]
     struct Summary {
@@ -228,7 +228,7 @@ pub(crate) fn kept_members(directory: &Path, config: &FitConfig) -> Vec<ModelFil
     }
 }
 
-/// File of a member's model.
+/// File name of a member's model.
 fn file(member: usize) -> String {
     if member == 0 { MODEL.to_string() } else { format!("member-{member}.safetensors") }
 }
@@ -255,7 +255,7 @@ fn of_the_mean(members: &[&HoldOut]) -> Vec<PredictionError> {
     members[0].model.iter().map(|error| prediction_error(&first.windows, &means, scales, error.seconds)).collect()
 }
 
-/// Mass matrices `(states, n, n)` at states and energies `(states)` at rest there, of every member, times the factors of their Lagrangians.
+/// Returns mass matrices `(states, n, n)` and energies at rest `(states)` of every member, multiplied by the factors of their Lagrangians.
 fn in_one_gauge(
     networks: &[&NetworkLagrangian<f64>],
     factors: &[f64],
@@ -264,7 +264,7 @@ fn in_one_gauge(
     let rest = vec![0.0; v.len()];
     let of = |(network, factor): (&&NetworkLagrangian<f64>, &f64)| {
         let mut terms = Terms::default();
-        // Terms that are not finite at a state make the spread not finite.
+        // If terms are not finite at a state, neither is the spread.
         let _ = network.terms(q, v, Request::MASS_MATRIX, &mut terms);
         let masses: Vec<f64> = terms.mass_matrix.iter().map(|m| m * factor).collect();
         let _ = network.terms(q, &rest, Request::ENERGY, &mut terms);
@@ -273,7 +273,7 @@ fn in_one_gauge(
     networks.iter().zip(factors).map(of).unzip()
 }
 
-/// Mean and variance of a number over members.
+/// Mean and variance over members.
 fn moments(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let (count, sum) = values.clone().fold((0.0, 0.0), |(count, sum), x| (count + 1.0, sum + x));
     let mean = sum / count;

@@ -1,10 +1,10 @@
-//! Work that would not fit into the machine's memory is refused before it begins.
+//! Rejects work that does not fit into memory before it begins.
 
 use crate::pipeline::PipelineError;
 use crate::storage::available_memory;
 
-/// Refuses work that takes more memory than is available; where the system does not say how much is, only work whose
-/// memory cannot be counted.
+/// Rejects work that needs more memory than is available. If the available memory is unknown, only work whose memory cannot be counted is
+/// rejected.
 ///
 /// # Errors
 /// [`PipelineError::Memory`] with both figures.
@@ -24,7 +24,7 @@ fn check(work: &str, needed: Option<u64>, available: Option<u64>) -> Result<(), 
     }
 }
 
-/// `1.5 GB`, powers of ten.
+/// Formats a size such as `1.5 GB`, with powers of ten.
 fn size(bytes: u64) -> String {
     let units = ["kB", "MB", "GB", "TB", "PB", "EB"];
     let mut value = bytes as f64 / 1e3;
@@ -35,11 +35,11 @@ fn size(bytes: u64) -> String {
     format!("{value:.1} {}", units[unit])
 }
 
-/// Bytes of `motions` sampled motions of `n` coordinates, `samples` each: `2 n + 2` numbers per sample, held three times (computed, stored
-/// and evaluated) in vectors that may have grown to twice their length, and as `text` bytes of text.
+/// Counts the bytes of `motions` sampled motions of `n` coordinates with `samples` samples each: `2 n + 2` numbers per sample in three
+/// copies (computed, stored and evaluated), in vectors whose capacity may be twice their length, and `text` bytes of text.
 pub(crate) fn motions(motions: u64, samples: f64, n: usize, text: u64) -> Option<u64> {
     let numbers = (n as u64).checked_add(1)?.checked_mul(2)?;
-    // A quotient beyond 64 bits saturates, and later sums with it overflow.
+    // A quotient beyond 64 bits saturates, and the sums below detect the overflow.
     let samples = (samples.abs().ceil() as u64).checked_add(1)?;
     numbers.checked_mul(48 + text)?.checked_mul(samples)?.checked_mul(motions)
 }

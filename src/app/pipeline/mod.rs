@@ -106,7 +106,7 @@ pub use text::parse_system;
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
 pub use watch::{Event, Watch};
 
-// For the packages of this repository.
+// Used by the other packages of this repository.
 #[doc(hidden)]
 pub use {
     checkpoints::{Begin, Checkpoints},

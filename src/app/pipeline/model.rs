@@ -1,4 +1,4 @@
-//! Model files of runs: where they lie, the states they were trained on, the parameters of their systems.
+//! Model files of runs: their location, the states they were trained on, and the parameters of their systems.
 
 use crate::lagrangian::SystemInstance;
 use crate::lagrangian::system::Size;
@@ -9,11 +9,11 @@ use crate::scalar::Scalar;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Message of commands that know free coordinates alone, about a motion under constraints.
+/// Message of commands that only support free coordinates, for motion under constraints.
 pub const CONSTRAINTS_UNSUPPORTED: &str =
     "the motion has constraints, which this command does not support; see `lnn constraints`";
 
-/// The file of a model that is given by its file or by the directory of its run.
+/// Finds a model file, given its path or the directory of its run.
 ///
 /// # Errors
 /// [`PipelineError::NoModel`] for a directory without a model.
@@ -33,7 +33,7 @@ pub fn trained_on<S: Scalar>(header: &Header) -> Domain<S> {
     Domain::new(positions.chain(header.velocity.iter().map(|b| Some(bound(b)))).collect())
 }
 
-/// Values of all parameters of a system, its size among them.
+/// Values of all parameters of a system, including its size.
 pub fn all_parameters(system: &SystemInstance<f64>) -> BTreeMap<String, f64> {
     let named = system.system.parameters.iter().map(|p| p.symbol.to_string());
     let mut parameters: BTreeMap<_, _> = named.zip(system.parameters.iter().copied()).collect();

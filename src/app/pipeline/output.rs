@@ -9,21 +9,21 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Sink for the files of a pipeline. The model is written first, then small files, and pictures last, so that a full disk loses none of the
 /// others.
 pub trait Output: Sync {
-    /// Writes a file whole or not at all; one of this name is replaced. Names have no directories.
+    /// Writes a file atomically, replacing one of the same name. Names have no directories.
     ///
     /// # Errors
     /// [`PipelineError::Output`] naming the file.
     fn write(&self, name: &str, bytes: &[u8]) -> Result<(), PipelineError>;
 }
 
-/// Directory that files are written into, each whole or not at all.
+/// Directory into which files are written atomically.
 #[derive(Clone, Debug)]
 pub struct Directory {
     path: PathBuf,
 }
 
 impl Directory {
-    /// The directory of a path, created if need be.
+    /// Opens a directory, which is created if needed.
     ///
     /// # Errors
     /// [`PipelineError::Output`] if it cannot be created.

@@ -1,5 +1,5 @@
 //! Physics of a model: its functions, metric, curvature, symmetries, charges and signature, compared with those of the system that it
-//! learned.
+//! learned. Work is limited by counts instead of time, so that every run gives the same results.
 //!
 //! The work is bounded by size, not by time, so that every run gives the same results.
 
@@ -28,12 +28,12 @@ use crate::symmetry::{Chart, Degrees, Region, Symmetries, bases, drifts, enough,
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Curvature scalar of the learned metric at rest, times the factor up to which a Lagrangian is determined.
+/// Curvature scalar of the learned metric at rest, multiplied by the free factor of the Lagrangian.
 #[derive(Clone, Debug, Serialize)]
 pub struct CurvatureScalar {
-    /// Factor that brings the learned metric closest to the exact one; 1 without an exact one.
+    /// Factor that brings the learned metric closest to the exact one; 1 if the exact one is unknown.
     pub factor: f64,
-    /// Curvature of the model, with the factor.
+    /// Curvature of the model, including the factor.
     pub learned: Spread,
     /// Curvature of the system, if it is known.
     pub exact: Option<Spread>,
@@ -42,11 +42,11 @@ pub struct CurvatureScalar {
 /// Point symmetries that were found.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundSymmetries {
-    /// Their number; none if there is no gap between singular values.
+    /// Number of symmetries; `None` if there is no gap between singular values.
     pub count: Option<usize>,
-    /// Ratio of the first singular value that is not zero to the last that is.
+    /// Ratio of the smallest singular value that is not zero to the largest that is.
     pub gap: Option<f64>,
-    /// Name of the algebra, if it has one.
+    /// Name of the algebra, if it has a usual one.
     pub name: Option<String>,
     /// Formulas of the fields.
     pub fields: Vec<String>,
@@ -75,26 +75,26 @@ pub struct ChargeDrift {
     pub start: f64,
     /// Charge at the end less that at the start, the sum of the next two.
     pub drift: f64,
-    /// Part of the model, whose acceleration is not the exact one.
+    /// Drift caused by the model, whose acceleration is not exact.
     pub by_model: f64,
-    /// The rest.
+    /// Remaining drift, caused by the integrator.
     pub by_integrator: f64,
 }
 
-/// Shares of the region where the mass matrix is proven to have, or not to have, its signature.
+/// Shares of the region in which the mass matrix is proven to have a signature, or proven not to have it.
 #[derive(Clone, Debug, Serialize)]
 pub struct ProvenSignature {
-    /// Positive eigenvalues that are to be proven.
+    /// Number of positive eigenvalues to prove.
     pub positive: usize,
-    /// Negative ones.
+    /// Number of negative eigenvalues.
     pub negative: usize,
-    /// `true` if the structure of the model proves it at every state.
+    /// `true` if the structure of the model guarantees the signature at every state.
     pub by_construction: bool,
-    /// Share in which it is proven.
+    /// Share of the region in which the signature is proven.
     pub certified: f64,
-    /// Share in which the opposite is proven.
+    /// Share of the region in which the signature is refuted.
     pub refuted: f64,
-    /// Share in which neither is proven by this many boxes.
+    /// Share of the region that remains undecided with this number of boxes.
     pub open: f64,
     /// Boxes that were evaluated.
     pub boxes: usize,
@@ -107,9 +107,9 @@ pub struct Physics {
     pub region: BTreeMap<String, [f64; 2]>,
     /// Best factor and gauge term relative to the exact Lagrangian, if the system is known, and the remaining differences.
     pub equivalence: Option<Equivalence>,
-    /// Components of the metric, of geodesics alone.
+    /// Components of the metric, for geodesics only.
     pub metric: Vec<MetricComponent>,
-    /// Curvature scalar, of geodesics in two dimensions at least.
+    /// Curvature scalar, for geodesics in at least two dimensions.
     pub curvature_scalar: Option<CurvatureScalar>,
     /// Point symmetries of the model.
     pub symmetries: Option<FoundSymmetries>,
@@ -117,11 +117,11 @@ pub struct Physics {
     pub exact_symmetries: Option<FoundSymmetries>,
     /// Drifts of the system's charges along the first learned motion, up to the end of its picture; the energy first.
     pub charges: Vec<ChargeDrift>,
-    /// Time until which they were followed.
+    /// End of the time over which the charges were followed.
     pub charges_until: f64,
     /// Certificate of the signature.
     pub signature: Option<ProvenSignature>,
-    /// Parts that are missing and why.
+    /// Parts that were left out, with the reasons.
     pub left_out: Vec<String>,
     /// Names of the coordinates.
     #[serde(skip)]
@@ -131,7 +131,7 @@ pub struct Physics {
     pub figures: Vec<Figure>,
 }
 
-/// A model with the data about it.
+/// A model and the data needed to analyse it.
 pub(crate) struct Subject<'a> {
     pub network: &'a NetworkLagrangian<f64>,
     /// States that it was trained on; periodic coordinates are unbounded.
@@ -141,7 +141,7 @@ pub(crate) struct Subject<'a> {
     /// Names of coordinates and velocities, with units as labels of axes.
     pub columns: Vec<String>,
     pub labels: Vec<String>,
-    /// The recorded motion that it was trained on, if any, and what that determines.
+    /// The recorded motion that it was trained on, if any, and what this motion determines.
     pub recorded: Option<&'a Recording>,
     pub determined: Option<&'a Determined>,
     /// Learned motion along which charges are followed.
@@ -150,7 +150,7 @@ pub(crate) struct Subject<'a> {
 }
 
 impl Physics {
-    /// Physics of a model; `check` is called between the parts, and its error ends the work.
+    /// Analyses a model; `check` is called between the parts, and its error ends the work.
     ///
     /// # Errors
     /// That of `check`; a system that cannot be built.
@@ -163,14 +163,14 @@ impl Physics {
         Ok(found)
     }
 
-    /// The physics of a model under constraints, without the parts that would need states off the constraints.
+    /// Physics of a model under constraints, without the parts that need states off the constraints.
     pub(crate) fn under_constraints(subject: &Subject<'_>) -> Self {
         let problem = "maps of the learned functions, curvature, symmetries, certificate of the signature: the Lagrangian has no \
                        meaning off the constraints";
         Self { left_out: vec![problem.to_string()], ..Self::nothing(subject) }
     }
 
-    /// No part of it yet.
+    /// Creates an empty result.
     pub(crate) fn nothing(subject: &Subject<'_>) -> Self {
         let region = subject.region();
         let ranges = region.position.iter().chain(&region.velocity).copied();
@@ -181,7 +181,7 @@ impl Physics {
         }
     }
 
-    /// Computes one part after another; parts before an error are complete.
+    /// Computes the parts one by one; parts before an error are complete.
     ///
     /// # Errors
     /// Those of [`Physics::new`].
@@ -212,7 +212,7 @@ impl Physics {
         }
     }
 
-    /// Functions of the Lagrangian, of geodesics the metric and its curvature.
+    /// Computes the functions of the Lagrangian; for geodesics, the metric and its curvature.
     fn find_geometry(&mut self, subject: &Subject<'_>, region: &Region, exact: Option<&dyn EulerLagrange<f64>>) {
         let (network, n) = (subject.network, subject.network.coordinates());
         let (q, v) = subject.states(region, CURVATURE_POINTS.0);
@@ -279,8 +279,8 @@ impl Physics {
         }
     }
 
-    /// The region of the pictures: the recorded motion, or the region of the states; maps are over the first two coordinates, or the first
-    /// two of space if there are two.
+    /// Region of the pictures: the recorded motion, or the region of the states. Maps are over the first two coordinates, or the first two
+    /// spatial ones if there are two.
     fn picturing<'a>(&self, subject: &Subject<'a>, region: &Region, unit: String) -> Picturing<'a> {
         let n = self.coordinates.len();
         let shown = if n > 2 && subject.time_like() == Some(0) { [1, n - 1] } else { [0, (n - 1).min(1)] };
@@ -399,7 +399,7 @@ impl Physics {
     }
 }
 
-/// The factors that multiply a learned Lagrangian for comparison with the exact one, per coordinate, in words.
+/// Describes the factors that multiply a learned Lagrangian for comparison with the exact one, per coordinate.
 fn taken(names: &[String], factors: &[f64]) -> String {
     if factors.iter().all(|factor| *factor == factors[0]) {
         return format!("The learned Lagrangian is taken times {}, its best factor.", number(factors[0]));
@@ -413,13 +413,13 @@ impl Subject<'_> {
         self.system.and_then(|system| system.system.time_like).or(self.network.architecture().time_like)
     }
 
-    /// `true` if known forces drove the motion: they fix the unit of `L`.
+    /// `true` if known forces drove the motion, which fixes the unit of `L`.
     fn is_forced(&self) -> bool {
         self.recorded.is_some_and(|recording| recording.tracks.iter().any(|track| !track.force.is_empty()))
     }
 
-    /// The middle of the states that the model was trained on; for a known system, of those on which errors are stated as well; angles make
-    /// a full turn.
+    /// Central part of the states that the model was trained on; for a known system, limited to the states on which errors are reported;
+    /// angles cover a full turn.
     fn region(&self) -> Region {
         let n = self.network.coordinates();
         let stated = self.system.map(|system| {
@@ -442,7 +442,7 @@ impl Subject<'_> {
         Region { position: all, velocity }
     }
 
-    /// States `(states, n)` of the region, on the mass shell and inside the domain of the system.
+    /// Samples states `(states, n)` of the region, on the mass shell and inside the domain of the system.
     fn states(&self, region: &Region, states: usize) -> (Vec<f64>, Vec<f64>) {
         let inside = |q: &[f64], v: &mut [f64]| {
             let fits =

@@ -4,16 +4,16 @@ use crate::names::{number, rounded};
 use crate::pipeline::physics::{FoundSymmetries, Physics};
 use crate::report::Report;
 
-/// Shown where there is no number.
+/// Shown if there is no number.
 const NONE: &str = "-";
 
-/// A number with four digits, or [`NONE`].
+/// Formats a number with four digits, or returns [`NONE`].
 fn shown(x: Option<f64>) -> String {
     x.map_or(NONE.to_string(), |x| rounded(x, 4))
 }
 
 impl Physics {
-    /// Tables and remarks on missing parts; the pictures are above all tables of a page.
+    /// Adds tables, and remarks on missing parts; the pictures come before all tables of a page.
     pub(crate) fn report(&self, report: Report) -> Report {
         let about = "Symmetries, charges and signature, of geodesics metric and curvature, over the middle of the states that the \
                      model was trained on.";

@@ -1,4 +1,4 @@
-//! Predictions of held-out windows in bounded time, and the reasons for failures.
+//! Predicts held-out windows in limited time and counts the reasons for failures.
 
 use crate::analysis::{Predictions, Window, follow};
 use crate::lagrangian::EulerLagrange;
@@ -15,14 +15,14 @@ pub(crate) struct HeldOutPredictions {
     pub windows: Vec<Window>,
     /// Their predictions.
     pub predictions: Predictions,
-    /// Windows there were.
+    /// Number of available windows.
     pub all: usize,
-    /// Numbers of failed predictions by reason.
+    /// Number of failed predictions by reason.
     pub given_up: BTreeMap<&'static str, usize>,
 }
 
 impl HeldOutPredictions {
-    /// Predicts the windows, or a few of them if those show that prediction is hopeless.
+    /// Predicts the windows, or only a few of them if most of those fail.
     ///
     /// # Errors
     /// [`PipelineError::Interrupted`].
@@ -56,7 +56,7 @@ impl HeldOutPredictions {
         }
     }
 
-    /// Predictions that were given up or left out, in words; empty if all succeeded.
+    /// Describes predictions that failed or were left out; empty if all succeeded.
     pub fn remarks(&self) -> String {
         let mut text = String::new();
         let predicted = self.windows.len();
@@ -75,7 +75,7 @@ impl HeldOutPredictions {
     }
 }
 
-/// Predicts in chunks, reports progress and honours cancellation.
+/// Predicts in chunks, reports progress and checks the interrupt flag.
 fn in_parts(
     model: &dyn EulerLagrange<f64>,
     windows: &[Window],
@@ -93,7 +93,7 @@ fn in_parts(
     Ok((predictions, stops))
 }
 
-/// Why a motion ended, in a few words.
+/// Explains briefly why a motion ended.
 fn reason(stop: &RolloutError) -> &'static str {
     match stop {
         RolloutError::SingularMass { .. } => "a singular mass matrix",

@@ -1,4 +1,4 @@
-//! Recorded motion made ready for a fit: derivatives, division, the configuration that suits it.
+//! Recorded motion prepared for a fit: derivatives, split, suitable configuration.
 
 use crate::configuration::{Config, ConfigError, Precision};
 use crate::data::{Dataset, Datasets, RecordingSplit};
@@ -14,26 +14,25 @@ use crate::recording::{LoadedRecording, Targets};
 use crate::scalar::Scalar;
 use std::time::Instant;
 
-/// Recorded motion with its derivatives, divided into training, validation and test states.
+/// Recorded motion with its derivatives, split into training, validation and test states.
 #[derive(Debug)]
 pub struct PreparedFit<'a> {
-    /// What was read.
+    /// The recording as it was read.
     pub reading: &'a LoadedRecording,
     pub(crate) options: FitOptions,
-    /// Its smoothed states, divided.
+    /// The smoothed and split recording.
     pub measured: RecordingSplit,
     pub(crate) targets: Targets,
     /// Constraints on the motion.
     pub(crate) held: Option<FitHeld>,
-    /// Remarks on them.
+    /// Remarks on the constraints.
     pub(crate) remarks: Vec<String>,
-    /// Time at which the work began, for the time that the summary states.
+    /// Start of the work, for the duration in the summary.
     pub started: Instant,
 }
 
 impl<'a> PreparedFit<'a> {
-    /// Smooths and divides recorded motion; a [`Recording`](crate::recording::Recording) in memory becomes a [`LoadedRecording`] by
-    /// `into`.
+    /// Smooths and splits recorded motion; a [`Recording`](crate::recording::Recording) in memory becomes a [`LoadedRecording`] by `into`.
     ///
     /// # Errors
     /// [`PipelineError::Recording`] for motion that cannot be learned from, [`PipelineError::NoAccelerations`] if measured ones are
@@ -85,7 +84,7 @@ impl<'a> PreparedFit<'a> {
     /// The range that the held-out motion allows.
     pub fn check_horizon(&self, horizon: Option<f64>) -> Result<(), ConfigError> {
         let (Some(found), Some((least, most))) = (horizon, horizons(&self.measured.test)) else { return Ok(()) };
-        // The last sample may be early or late by a rounding error of the times.
+        // Tolerates a rounding error in the time of the last sample.
         if (least * (1.0 - 1e-9)..=most * (1.0 + 1e-9)).contains(&found) {
             return Ok(());
         }
@@ -104,7 +103,7 @@ impl<'a> PreparedFit<'a> {
         Ok(survey(self.reading, &SurveyOptions { smooth, validation, seed })?)
     }
 
-    /// The configuration that suits the data, of a system called `name`.
+    /// Suggests a configuration that suits the data, for a system called `name`.
     ///
     /// # Errors
     /// [`PipelineError::Recording`], if no sample has a full window around it for instance.
@@ -117,7 +116,7 @@ impl<'a> PreparedFit<'a> {
         Ok(self.config(training, None, FitColumns::default(), shooting))
     }
 
-    /// The configuration of this fit with these parts.
+    /// Assembles the configuration of this fit.
     pub fn config(
         &self,
         training: Config,
@@ -142,7 +141,7 @@ impl<'a> PreparedFit<'a> {
         }
     }
 
-    /// The supervised training that suits the data.
+    /// Suggests a supervised training that suits the data.
     pub fn suggest_training(&self, name: &str, precision: Precision) -> Result<Config, PipelineError> {
         match precision {
             Precision::F32 => self.suggest_in::<f32>(name),
@@ -155,7 +154,7 @@ impl<'a> PreparedFit<'a> {
     }
 }
 
-/// Shortens a supervised training that multiple shooting follows to a third.
+/// Shortens supervised training to a third, for use before multiple shooting.
 pub fn shorten(training: &mut Config) {
     let phase = &mut training.phases[0];
     phase.epochs = phase.epochs.div_ceil(3);

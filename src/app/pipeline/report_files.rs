@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-/// The texts of a picture, as [`CAPTIONS`] has them.
+/// The texts of a picture, as stored in [`CAPTIONS`].
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Caption {
     pub heading: String,
@@ -113,7 +113,7 @@ pub(crate) fn training_pictures(epochs: &[Epoch]) -> Vec<Figure> {
     training_figures(&epochs.iter().map(row).collect::<Vec<_>>())
 }
 
-/// The end of a training in the words of `summary.json`.
+/// Describes the end of a training, as `summary.json` states it.
 pub(crate) fn ended(stop: &StopReason) -> String {
     match stop {
         StopReason::Finished => "finished".to_string(),

@@ -1,4 +1,4 @@
-//! `run.json`: the command that fills a directory.
+//! `run.json`: records the command that fills a directory.
 
 use crate::pipeline::thresholds::MAX_RUN_BYTES;
 use crate::pipeline::{Output, PipelineError, RUN};
@@ -31,7 +31,7 @@ struct RunFile {
 }
 
 impl Command {
-    /// The word for it on the command line.
+    /// Name of the command on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Train => "train",
@@ -59,7 +59,7 @@ impl Command {
         output.write(RUN, self.text()?.as_bytes())
     }
 
-    /// The command that `run.json` in a directory names.
+    /// Reads from `run.json` which command filled a directory.
     ///
     /// # Errors
     /// What is wrong with the file, in words.

@@ -1,4 +1,4 @@
-//! The table of the runs of an experiment, one line each: its choices and its numbers.
+//! The table of the runs of an experiment, one line each, with settings and results.
 
 use crate::experiments::{Outcome, Record, Run};
 use crate::pipeline::experiment_directory::ExperimentDirectory;
@@ -70,7 +70,7 @@ fn outcome(record: Option<&Record>) -> [Value; 7] {
     [json!(name), Value::Null, Value::Null, Value::Null, Value::Null, Value::Null, Value::Null]
 }
 
-/// Values of the keys of a configuration by their paths, without the seed; lists as text.
+/// Values of the keys of a configuration by path, without the seed; lists as text.
 fn choices(run: &Run) -> Result<BTreeMap<String, Value>, PipelineError> {
     fn visit(path: &str, value: &toml::Value, found: &mut BTreeMap<String, Value>) {
         let inside = |name: &str| if path.is_empty() { name.to_string() } else { format!("{path}.{name}") };

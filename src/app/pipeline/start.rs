@@ -1,4 +1,4 @@
-//! Training that starts from a model: the configuration takes the model's shape, and another shape is refused.
+//! Training that starts from a model: the configuration adopts the model's shape, and any other shape is rejected.
 
 use crate::configuration::{Config, Known, Precision, Scaling};
 use crate::network::Architecture;
@@ -8,7 +8,7 @@ use crate::scalar::Scalar;
 use serde_json::Value;
 use std::path::Path;
 
-/// The model to start from, as far as the shape of a training is concerned.
+/// The header of a model to start from, which fixes the shape of a training.
 pub struct StartModel {
     /// The path as the user gave it.
     pub from: String,
@@ -17,7 +17,7 @@ pub struct StartModel {
 }
 
 impl StartModel {
-    /// Reads a model, by file or by the directory of its run.
+    /// Reads a model, given its file or the directory of its run.
     ///
     /// # Errors
     /// [`PipelineError::NoModel`] and [`PipelineError::Model`] for anything but an intact model file.
@@ -28,7 +28,7 @@ impl StartModel {
         Ok(Self { from: from.to_string(), header })
     }
 
-    /// Gives a configuration the model's shape and precision.
+    /// Sets the model's shape and precision in a configuration.
     pub fn shape(&self, config: &mut Config) {
         let model = &self.header.architecture;
         let network = &mut config.network;
@@ -56,7 +56,7 @@ impl StartModel {
         config.from = Some(self.from.clone());
     }
 
-    /// Refuses a configuration whose network, for coordinates that are angles or not, is not the model's.
+    /// Rejects a configuration whose network has another shape than the model; `periodic` marks angles.
     ///
     /// # Errors
     /// [`PipelineError::OtherShape`] naming everything that differs.

@@ -9,7 +9,7 @@ use crate::pipeline::{
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// An experiment whose runs the user chooses.
+/// An experiment whose runs are chosen by the user.
 #[derive(Clone, Copy, Debug)]
 pub struct Sweep;
 
@@ -27,12 +27,12 @@ impl Experiment for Sweep {
     }
 }
 
-/// The table of a sweep.
+/// The results of a sweep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Swept {
     /// One object for each choice, as in `table.csv`.
     pub rows: Vec<Map<String, Value>>,
-    /// Runs that are finished.
+    /// Number of finished runs.
     pub finished: usize,
     /// Headline and tables.
     pub findings: Findings,

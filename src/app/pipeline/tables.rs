@@ -3,12 +3,12 @@
 use serde::de::DeserializeOwned;
 use toml::Value;
 
-/// A value from a table. Types are read only from tables, not from text, so that their code is compiled for a single format.
+/// Deserializes a value from a table. Types are only read from tables, not from text, so that their code is compiled for a single format.
 ///
 /// # Errors
 /// The path of the rejected key, such as `phase[0].rate`, and what is wrong there.
 pub fn from_table<T: DeserializeOwned>(table: Value) -> Result<T, (String, String)> {
-    // A date would be read as text.
+    // A date would otherwise be accepted as text.
     if let Some(path) = date(&table) {
         return Err((path, "no key accepts a date or a time".to_string()));
     }

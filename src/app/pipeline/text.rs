@@ -1,4 +1,4 @@
-//! Text of configurations and systems: complete ones, lines of keys.
+//! Parses configurations and systems, and finds the lines of keys.
 
 use crate::lagrangian::{Description, System};
 use crate::pipeline::from_table;
@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-/// The system of a description in TOML, the text of a system file.
+/// Parses the description of a system in TOML.
 ///
 /// # Errors
 /// Line, from 1, and what is wrong there.
@@ -41,15 +41,15 @@ pub fn table(text: &str) -> Result<Table, (usize, String)> {
     text.parse().map_err(|error| (place(&error), error.message().to_string()))
 }
 
-/// Line, from 1, of a place in a text.
+/// Line number, from 1, of a byte offset.
 fn line(text: &str, at: usize) -> usize {
     1 + text.as_bytes()[..at.min(text.len())].iter().filter(|b| **b == b'\n').count()
 }
 
-/// Lines of the keys of a text, from 1, by their paths, such as `phase[0].rate`.
+/// Line numbers, from 1, of the keys of a text, by path, such as `phase[0].rate`.
 pub type Lines = BTreeMap<String, usize>;
 
-/// Line of the key at a path, or of the innermost table or list around it that has one.
+/// Line of the key at a path, or of the innermost enclosing table or list with a known line.
 pub fn line_of(lines: &Lines, mut path: &str) -> Option<usize> {
     loop {
         if let Some(line) = lines.get(path) {
@@ -59,7 +59,7 @@ pub fn line_of(lines: &Lines, mut path: &str) -> Option<usize> {
     }
 }
 
-/// The lines of all keys of a TOML text.
+/// Finds the lines of all keys of a TOML text.
 pub fn lines(text: &str) -> Lines {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut found = Lines::new();

@@ -18,19 +18,19 @@ pub(crate) struct TimeSteps {
     left_out: LeftOut,
 }
 
-/// Rows whose accelerations were not used for training.
+/// Number of rows whose accelerations were not used for training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 struct LeftOut {
-    /// Rows between gaps, too few for a trajectory.
+    /// Rows between gaps that are too few for a trajectory.
     between_gaps: usize,
     /// Samples of the training part without a full window, at the ends of its trajectories.
     at_ends: usize,
-    /// Samples of the training part that a gap leaves without enough others around them.
+    /// Samples of the training part that have too few neighbours because of a gap.
     near_gaps: usize,
 }
 
 impl TimeSteps {
-    /// Steps of a recording whose part `training` is used with these targets.
+    /// Summarises the time steps of a recording and the rows of its part `training` that are not used with these targets.
     pub fn new(reading: &LoadedRecording, training: &Split, targets: Targets) -> Self {
         let jitter = reading.recording.tracks.iter().map(|track| Clock::of(&track.times).jitter());
         let [at_ends, near_gaps] = training.left_out(targets);
@@ -39,7 +39,7 @@ impl TimeSteps {
         Self { bridged: reading.bridged, cuts: reading.cuts.len(), jitter: jitter.fold(0.0, f64::max), left_out }
     }
 
-    /// In words; empty if steps are even and there is no gap.
+    /// Describes the time steps in words; empty if they are even and there is no gap.
     pub fn lines(&self) -> Vec<String> {
         let mut parts = Vec::new();
         let Bridged { gaps, rows, longest } = self.bridged;

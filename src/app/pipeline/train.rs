@@ -1,4 +1,4 @@
-//! A training from its configuration to files: model, history, summary, pictures, report.
+//! Trains by a configuration and writes the files: model, history, summary, pictures, report.
 
 use crate::analysis::{stretches, training_instability};
 use crate::configuration::{Config, Penalty, Phase, Precision, Regularizer};
@@ -41,21 +41,21 @@ pub struct TrainFigures {
     pub epochs: usize,
     /// Weights of the network.
     pub weights: usize,
-    /// Best loss on the states that chose the epoch.
+    /// Best validation loss.
     pub validation_loss: f64,
-    /// Loss on fresh states.
+    /// Test loss, on fresh states.
     pub test_loss: f64,
     /// Fresh states without a finite acceleration.
     pub test_states_left_out: usize,
-    /// Instability of the training losses, if there are enough of them.
+    /// Instability of the training losses, if there are enough epochs.
     pub instability: Option<f64>,
-    /// Time of everything but pictures and report.
+    /// Duration without pictures and report, in s.
     pub wall_seconds: f64,
-    /// Time of the training.
+    /// Duration of the training, in s.
     pub training_seconds: f64,
-    /// Training states that were examined, over that time.
+    /// Training states processed per second of training.
     pub states_per_second: f64,
-    /// Reason for which training ended.
+    /// Why training ended.
     pub ended: String,
 }
 
@@ -72,13 +72,13 @@ struct Summary<'a> {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct RunOptions {
-    /// Threads; results do not depend on them.
+    /// Number of threads; results do not depend on it.
     pub threads: usize,
-    /// Starts of the trajectory test; a fit has none.
+    /// Number of starts of the trajectory test; a fit has no such test.
     pub starts: usize,
-    /// Fraction of the time span of the trajectory test.
+    /// Fraction of the system's time span that the trajectory test covers.
     pub span: f64,
-    /// Checkpoints, if they are wanted.
+    /// Checkpoints, if enabled.
     #[doc(hidden)]
     pub checkpoints: Option<Checkpoints>,
 }
@@ -93,15 +93,15 @@ impl Default for RunOptions {
 /// A model of a known system, after its files were written.
 #[derive(Debug)]
 pub struct TrainReport {
-    /// Reason for which training ended.
+    /// Why training ended.
     pub stop: StopReason,
     /// Header of the model's file.
     pub header: Header,
     /// The network with its best weights.
     pub network: NetworkLagrangian<f64>,
-    /// Epochs that were run.
+    /// History, one row per epoch.
     pub history: Vec<Epoch>,
-    /// The model, compared with the system that it learned.
+    /// Comparison of the model with the system that it learned.
     pub evaluation: Evaluation,
     /// Losses, times and sizes.
     pub figures: TrainFigures,
@@ -126,7 +126,7 @@ impl TrainReport {
         findings
     }
 
-    /// Losses, times and sizes in a line.
+    /// Describes losses, times and sizes in a line.
     fn losses(&self) -> String {
         let TrainFigures { validation_loss, test_loss, epochs, weights, .. } = self.figures;
         let fresh = match test_loss {
@@ -144,7 +144,7 @@ impl TrainReport {
         )
     }
 
-    /// The record that an experiment keeps of it, whose trajectory test went to `t_end`.
+    /// Creates the record for an experiment; the trajectory test ended at `t_end`.
     pub(crate) fn record(&self, run: String, t_end: f64) -> Record {
         let motions = || self.evaluation.trajectories.iter().map(|motion| &motion.summary);
         let scale = &self.network.architecture().scale;
@@ -212,13 +212,13 @@ fn train_in<S: Scalar>(
     let started = Instant::now();
     let toml = toml::to_string(config).map_err(PipelineError::format)?;
     let LearnedRun { trained, model, fresh } = LearnedRun::<S>::new((config, &toml), system, options, watch)?;
-    // The model first, then small files, pictures last, so that a full disk loses none of the others.
+    // The model is written first, then small files, then pictures, so that a full disk only loses pictures.
     write_model(output, &model)?;
     Command::Train.write(output)?;
     output.write("config.toml", toml.as_bytes())?;
     output.write("history.csv", history(&trained.history).as_bytes())?;
 
-    // Once the weights are known all numbers are doubles.
+    // From here on, all numbers are doubles.
     let ModelFile { header, weights } = model;
     let network = NetworkLagrangian::new(header.architecture.clone(), weights)?.cast::<f64>();
     let test = system.system.trajectory(system.coordinates);
@@ -248,7 +248,7 @@ fn train_in<S: Scalar>(
     Ok(report)
 }
 
-/// Result of a training before it is judged.
+/// Result of a training before its test.
 struct LearnedRun<S> {
     trained: Trained<S>,
     model: ModelFile<S>,
@@ -317,7 +317,7 @@ impl TrainFigures {
     }
 }
 
-/// A number that a record can hold.
+/// Converts to `None` if a number is not finite, which a record cannot store.
 fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
 }
@@ -347,7 +347,7 @@ fn header(
     ranges: [Vec<[f64; 2]>; 2],
     validation_loss: f64,
 ) -> Header {
-    // Defaults that change in a later version must not change this model.
+    // The file stores all parameters, so that later changes of defaults do not change this model.
     let mut parameters = all_parameters(system);
     parameters.extend(config.parameters.clone());
     let columns = system.system.columns(system.coordinates);
@@ -364,7 +364,7 @@ pub(crate) fn write_model<S: Scalar>(output: &dyn Output, model: &ModelFile<S>) 
     output.write(MODEL, &bytes)
 }
 
-/// A note for a penalty that the exact metric violates at some of the training states.
+/// Returns a note if the exact metric violates the penalty at some of the training states.
 fn penalty_note(config: &Config, system: &SystemInstance<f64>) -> Option<String> {
     let Regularizer::LorentzianSylvester { time, .. } = &config.penalty else { return None };
     let share = percent(forbidden_share(config, system).filter(|share| *share > 0.0)?);
@@ -372,7 +372,7 @@ fn penalty_note(config: &Config, system: &SystemInstance<f64>) -> Option<String>
     Some(format!("the penalty acts against g_{time}{time} > 0, which {share} of the states have, {advice}"))
 }
 
-/// Share of the training states at which the exact metric violates a penalty; `None` without such a penalty, or if it is unknown.
+/// Share of the training states at which the exact metric violates the penalty; `None` without such a penalty, or if the share is unknown.
 fn forbidden_share(config: &Config, system: &SystemInstance<f64>) -> Option<f64> {
     let Penalty::Sylvester { time: Some(time), .. } = config.penalty().ok()? else { return None };
     let mut few = config.clone();

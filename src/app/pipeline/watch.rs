@@ -6,7 +6,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Report of a pipeline under way.
+/// An event in a running pipeline.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Event<'a> {
@@ -61,12 +61,12 @@ impl fmt::Debug for Watch {
 }
 
 impl Watch {
-    /// A watch that hands events on.
+    /// Creates a watch that passes events to a function.
     pub fn new(events: impl Fn(Event<'_>) + Send + Sync + 'static) -> Self {
         Self { events: Some(Arc::new(events)), interrupt: Arc::default() }
     }
 
-    /// This watch with the events that pass only.
+    /// Copies the watch with a filter for events.
     fn filtered(&self, passes: fn(Event<'_>) -> bool) -> Self {
         let events = self.events.clone().map(|events| -> EventSink {
             Arc::new(move |event| {
@@ -78,7 +78,7 @@ impl Watch {
         Self { events, interrupt: Arc::clone(&self.interrupt) }
     }
 
-    /// This watch with remarks as its only events.
+    /// Copies the watch, limited to remarks.
     pub(crate) fn remarks_alone(&self) -> Self {
         self.filtered(|event| matches!(event, Event::Note(_)))
     }
@@ -93,7 +93,7 @@ impl Watch {
         self.interrupt.load(Ordering::SeqCst)
     }
 
-    /// Hands an event on.
+    /// Sends an event.
     pub(crate) fn say(&self, event: Event<'_>) {
         if let Some(events) = &self.events {
             events(event);

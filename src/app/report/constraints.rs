@@ -4,9 +4,9 @@ use super::{Figure, LinePlot, Series, figure, line_plot};
 use crate::constraints::{FoundConstraints, MotionSamples};
 use crate::lagrangian::{FormulaConstraints, Manifold, ManifoldRows};
 
-/// Constraints that are shown.
+/// Largest number of constraints that are shown.
 const MOST: usize = 7;
-/// Samples that are shown.
+/// Largest number of samples that are shown.
 const SAMPLES: usize = 2000;
 
 /// Distance of the motion from every constraint: `|phi|` over the length of its gradient; for a row that is linear in the velocities, `|A v

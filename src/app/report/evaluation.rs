@@ -82,11 +82,11 @@ pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
     pictures.into_iter().filter_map(drawn).collect()
 }
 
-/// Starts that have a line of their own in the pictures of errors.
+/// Starts that are drawn as separate lines in pictures of errors.
 const LINES: usize = 7;
-/// Coordinates that have pictures of their own.
+/// Largest number of coordinates with their own pictures.
 const COORDINATES: usize = 8;
-/// Time span of the picture over the median time of valid prediction.
+/// Time span of the picture divided by the median time of valid prediction.
 const BEYOND_VALID: f64 = 4.0;
 
 /// Times and values of one quantity of a run.
@@ -188,7 +188,7 @@ pub(crate) fn units<S>(system: &SystemInstance<S>) -> Vec<(String, Vec<usize>)> 
     by_unit(&system.system.units(system.coordinates)[..system.coordinates])
 }
 
-/// Coordinates of a start, and velocities if there is a time-like coordinate: the rates of clocks.
+/// Draws the coordinates of a start over time; with a time-like coordinate, also the velocities, which are the rates of clocks.
 fn over_time_of<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: &str, system: &SystemInstance<S>) {
     let n = system.coordinates;
     let (coordinates, columns) = (system.system.coordinates(n), system.system.columns(n));
@@ -213,13 +213,13 @@ fn over_time_of<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: 
     }
 }
 
-/// Ends of a path.
+/// Describes the ends of a path.
 fn from_the_dot<S: Scalar>(trajectory: &Trajectory<S>, unit: &str) -> String {
     let end = trajectory.t.last().map_or(0.0, |t| t.to_f64());
     format!("from the dot (0 {unit}) to {} {unit}", number(end))
 }
 
-/// Every portrayed start in the plane of the system.
+/// Draws the portrayed starts in the plane of the system.
 fn traces<S: Scalar>(figures: &mut Vec<Figure>, portraits: &[Portrait<S>], system: &SystemInstance<S>) {
     let n = system.coordinates;
     let polar = Polar::of(&system.system.columns(n)[..n], &system.system.units(n));
@@ -249,7 +249,7 @@ fn traces<S: Scalar>(figures: &mut Vec<Figure>, portraits: &[Portrait<S>], syste
     }
 }
 
-/// A start in the planes of coordinate and velocity.
+/// Draws a start in the planes of coordinate and velocity.
 fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: &str, system: &SystemInstance<S>) {
     let n = system.coordinates;
     let (columns, labels) = (system.system.columns(n), system.system.labels(n));
@@ -280,7 +280,7 @@ fn times<S: Scalar>(trajectory: &Trajectory<S>) -> impl Iterator<Item = f64> {
     trajectory.t.iter().map(|t| t.to_f64())
 }
 
-/// Component `k` of the states `(q, v)` over time; empty if the trajectory does not have it.
+/// Component `k` of the states `(q, v)` over time; empty if it does not exist.
 fn component<S: Scalar>(trajectory: &Trajectory<S>, k: usize) -> Vec<f64> {
     let n = trajectory.coordinates;
     let (values, offset) = if k < n { (&trajectory.q, k) } else { (&trajectory.v, k - n) };

@@ -5,7 +5,7 @@ use crate::experiments::{Record, Row, Run, RunSpread};
 use crate::names::rounded;
 use serde_json::json;
 
-/// A quantity of a row, and the paper's number next to it if there is one.
+/// A quantity of a row, and the published number for it if there is one.
 type Quantity = (&'static str, fn(&Row) -> Option<RunSpread>, Option<fn(&Row) -> Option<f64>>);
 
 /// Quantities of the table of an experiment, in the order of its columns.
@@ -61,15 +61,15 @@ const VIEW_HEADER: [&str; 16] = [
     "physical instability [SI]",
 ];
 
-/// Shown where there is no number.
+/// Shown if there is no number.
 const NONE: &str = "-";
 
-/// A number times a factor, with three digits.
+/// Formats a number times a factor with three digits.
 fn one(x: Option<f64>, factor: f64) -> String {
     x.map_or_else(|| NONE.to_string(), |x| rounded(factor * x, 3))
 }
 
-/// A spread as `mean [low, high]`, or only the value without a spread.
+/// Formats a spread as `mean [low, high]`, or as the value alone if all runs agree.
 fn spread(value: Option<RunSpread>, factor: f64) -> String {
     let Some(RunSpread { mean, low, high, .. }) = value else { return NONE.to_string() };
     let [mean, least, most] = [mean, low, high].map(|x| one(Some(x), factor));

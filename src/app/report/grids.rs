@@ -5,7 +5,7 @@ use crate::analysis::{Grid, Spread, affine_fit};
 use crate::names::{number, rounded};
 use std::f64::consts::{PI, TAU};
 
-/// How a learned quantity is brought to the exact one.
+/// How a learned quantity is scaled for comparison with the exact one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fit {
     /// By a known factor, described in words.
@@ -39,8 +39,8 @@ pub struct GridComparison {
     pub signs: bool,
 }
 
-/// Exact, learned and difference side by side, the first two with the same range of colours; none if a grid has no finite value or the
-/// grids differ in size.
+/// Draws the exact grid, the learned one and their difference side by side, the first two with the same range of colours; `None` if a grid
+/// has no finite value or the grids differ in size.
 ///
 /// The range is that of the exact values; if learned values of the wrong sign are marked, it includes their change of sign.
 pub fn grid_figures(comparison: &GridComparison) -> Option<Figure> {
@@ -99,7 +99,7 @@ pub struct QuantityMap {
     pub file: String,
     /// Labels of the horizontal and of the vertical axis, with units.
     pub labels: [String; 2],
-    /// Of the model.
+    /// Values of the model.
     pub learned: Grid,
     /// Values of the system, if it is known.
     pub exact: Option<Grid>,
@@ -109,11 +109,11 @@ pub struct QuantityMap {
     pub remark: String,
     /// Points to mark in the learned map.
     pub marks: Vec<(f64, f64)>,
-    /// `true` for every value of the learned map that is not determined; empty if all are.
+    /// `true` for every value of the learned map that the data do not determine; empty if they determine all.
     pub open: Vec<bool>,
 }
 
-/// One panel of a picture, without marks and with the colours of its own extremes.
+/// Creates a panel without marks, whose colours span its own extremes.
 pub(super) fn panel(title: impl Into<String>, [x_label, y_label]: &[String; 2], grid: &Grid) -> HeatMap {
     HeatMap {
         title: title.into(),
@@ -127,13 +127,13 @@ pub(super) fn panel(title: impl Into<String>, [x_label, y_label]: &[String; 2], 
     }
 }
 
-/// The panel of a difference.
+/// Creates the panel of a difference.
 fn difference_panel(labels: &[String; 2], grid: &Grid) -> HeatMap {
     HeatMap { diverging: true, ..panel("learned \u{2212} exact", labels, grid) }
 }
 
-/// Learned map, the exact one unless it is constant, and the difference; none if there is nothing finite to show. Colours leave
-/// out the lowest and the highest hundredth of the values.
+/// Draws the learned map, the exact one unless it is constant, and the difference; `None` if there is nothing finite to show. Colours
+/// ignore the lowest and the highest hundredth of the values.
 pub fn quantity_figure(map: &QuantityMap) -> Option<Figure> {
     let all = |grid: &Grid| Spread::of(&grid.values);
     let (learned, exact) = (all(&map.learned), map.exact.as_ref().map(all));
@@ -167,7 +167,7 @@ pub fn quantity_figure(map: &QuantityMap) -> Option<Figure> {
     figure(&format!("{}.svg", file_part(&map.file)), map.about.as_str(), heat_maps(&panels), caption)
 }
 
-/// The turn of an angle that an axis shows: `pi` to both sides of its middle.
+/// The turn of an angle that an axis shows: `pi` on both sides of its centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
     middle: f64,
@@ -193,7 +193,7 @@ impl Turn {
         self.middle + PI
     }
 
-    /// Whole turns between an angle and this turn.
+    /// Number of full turns between an angle and this turn.
     fn number(self, x: f64) -> f64 {
         ((x - self.low()) / TAU).floor()
     }
@@ -215,7 +215,7 @@ impl Turn {
                 let other = if up { self.low() } else { self.high() };
                 folded.extend([(end, height), (f64::NAN, f64::NAN), (other, height)]);
             } else if before.is_some_and(|(u, _)| self.number(u) != turn) {
-                // More than a turn between two points, or no number: no line leads there.
+                // Steps of more than a turn, and values that are not finite, interrupt the line.
                 folded.push((f64::NAN, f64::NAN));
             }
             folded.push((x - TAU * turn, y));

@@ -145,21 +145,21 @@ impl Report {
         self
     }
 
-    /// Adds a picture from the bytes of a PNG file, with its heading and its caption.
+    /// Adds a PNG picture with heading and caption.
     #[must_use]
     pub fn pixels(self, png: &[u8], texts: [&str; 2]) -> Self {
         self.figure(("image/png", png), "", texts)
     }
 
-    /// Adds a picture from the bytes of an SVG file, with its heading and its caption, embedded as an image, so that no script in it can run.
+    /// Adds an SVG picture with heading and caption; it is embedded as an image, so that no script in it can run.
     #[must_use]
     pub fn image(self, svg: &[u8], texts: [&str; 2]) -> Self {
-        // Panels that cannot wrap scroll if there is no room for them.
+        // Panels scroll if they are too wide for the page.
         let panels = svg.windows(8).filter(|bytes| bytes == b"\n<svg x=").count();
         self.figure(("image/svg+xml", svg), if panels > 1 { " class=\"panels\"" } else { "" }, texts)
     }
 
-    /// A picture of a media type, with attributes, between its heading and its caption.
+    /// Adds a picture of a media type, with attributes, between its heading and its caption.
     fn figure(mut self, (media, bytes): (&str, &[u8]), attributes: &str, [heading, caption]: [&str; 2]) -> Self {
         let (data, heading, caption) = (base64(bytes), above(heading), escape(caption));
         let _ = writeln!(
@@ -194,7 +194,7 @@ impl Report {
     }
 }
 
-/// The heading of a picture; nothing of an empty one.
+/// The heading of a picture; empty if it has none.
 fn above(heading: &str) -> String {
     if heading.is_empty() { String::new() } else { format!("<h3>{}</h3>", escape(heading)) }
 }
@@ -217,7 +217,7 @@ pub(super) fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// Text with the characters that mean something in HTML replaced; control characters that HTML forbids are dropped.
+/// Escapes the characters that have a meaning in HTML, and drops control characters that HTML forbids.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {

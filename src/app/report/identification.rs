@@ -6,26 +6,26 @@ use crate::formula::FoundFormula;
 use crate::identification::{Identified, ResidualPath};
 use crate::names::number;
 
-/// Coordinates that have pictures.
+/// Largest number of coordinates with pictures.
 const COORDINATES: usize = 8;
 /// Points of a line, at most.
 const POINTS: usize = 4000;
 /// Largest lag of an autocorrelation, in samples.
 const LAGS: usize = 40;
 
-/// What was measured and fitted, for pictures.
+/// Measured and fitted values for pictures.
 struct Fitted<'a> {
-    /// Names of the coordinates, of which files have theirs.
+    /// Names of the coordinates, as used in file names.
     names: Vec<&'a str>,
-    /// `true` if forces on them were fitted.
+    /// `true` if forces on the coordinates were fitted.
     is_force: bool,
     units: Vec<&'static str>,
     noise: Vec<f64>,
     paths: &'a [ResidualPath],
 }
 
-/// Measured and fitted values of the stretch with the median residual, all residuals over time, and their autocorrelation, for each
-/// coordinate; the correlations of the constants. `periodic` are the coordinates that are angles.
+/// Draws, for each coordinate, measured and fitted values of the segment with the median residual, all residuals over time, and their
+/// autocorrelation; also the correlations of the constants. `periodic` marks coordinates that are angles.
 pub fn identification_figures(found: &Identified, periodic: &[bool]) -> Vec<Figure> {
     let is_force = found.segments == 0;
     let fit = Fitted {
@@ -38,7 +38,7 @@ pub fn identification_figures(found: &Identified, periodic: &[bool]) -> Vec<Figu
     fit.figures().chain(correlations(found)).collect()
 }
 
-/// Measured and fitted values of held-out motion, as [`identification_figures`] draws them; none for the formula of a model.
+/// Draws measured and fitted values of held-out motion like [`identification_figures`]; nothing for the formula of a model.
 pub fn formula_figures(found: &FoundFormula) -> Vec<Figure> {
     let fit = Fitted {
         names: found.coordinates.iter().map(String::as_str).collect(),
@@ -59,7 +59,7 @@ impl Fitted<'_> {
         (0..self.names.len().min(COORDINATES)).flat_map(|i| self.of(i)).flatten()
     }
 
-    /// The pictures of coordinate `i`.
+    /// Draws the pictures of coordinate `i`.
     fn of(&self, i: usize) -> [Option<Figure>; 3] {
         let (name, unit, noise) = (self.names[i], self.units[i], number(self.noise[i]));
         let file = |what: &str| format!("{what}_{}.svg", file_part(name));
@@ -110,7 +110,7 @@ impl Fitted<'_> {
         let mut points = Vec::new();
         for path in self.paths {
             points.extend(path.times.iter().copied().zip(column(&path.residuals, n, i)).step_by(stride));
-            // Stretches are not joined.
+            // A gap separates the segments.
             points.push((f64::NAN, f64::NAN));
         }
         let level = Some(Level { value: 0.0, name: String::new() });
@@ -144,10 +144,10 @@ impl Fitted<'_> {
     }
 }
 
-/// Points of a map along the side of a cell.
+/// Number of map points along the side of a cell.
 const CELL: usize = 16;
 
-/// Correlations of the errors of the constants as a map, a cell for each pair.
+/// Draws the correlations of the constants' errors as a map, with a cell for each pair.
 fn correlations(found: &Identified) -> Option<Figure> {
     let names = &found.correlations.names;
     if names.len() < 2 {
@@ -174,7 +174,7 @@ fn column(values: &[f64], n: usize, i: usize) -> impl Iterator<Item = f64> + '_ 
     values.iter().skip(i).step_by(n).copied()
 }
 
-/// Sum of squares of the residuals of a stretch over its samples.
+/// Mean square of the residuals of a segment.
 fn mean_square(path: &ResidualPath) -> f64 {
     path.residuals.iter().filter(|r| r.is_finite()).map(|r| r * r).sum::<f64>() / path.times.len().max(1) as f64
 }

@@ -30,7 +30,7 @@ pub use table::DataTable;
 /// One picture of a report.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// File name without directory, with `.svg`.
+    /// File name ending in `.svg`, without directory.
     pub file: String,
     /// Title of the picture; may be empty.
     pub heading: String,
@@ -47,7 +47,7 @@ impl Figure {
     }
 }
 
-/// A figure with a heading; none if there was nothing to show, or only zeros.
+/// Creates a figure with a heading; `None` if there is nothing to show, or only zeros.
 pub fn figure(
     file: &str,
     heading: impl Into<String>,
@@ -58,12 +58,12 @@ pub fn figure(
     Some(Figure { file: file.to_string(), heading: heading.into(), picture, caption: caption.into() })
 }
 
-/// A quantity with its unit, if it has one.
+/// Formats a quantity with its unit, if it has one.
 pub fn with_unit(quantity: &str, unit: &str) -> String {
     if ["", "1"].contains(&unit) { quantity.to_string() } else { format!("{quantity} [{unit}]") }
 }
 
-/// Units, each with the indices that have it, in order.
+/// Groups indices by unit, in order of first appearance.
 pub fn by_unit(units: &[String]) -> Vec<(String, Vec<usize>)> {
     let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
     for (i, unit) in units.iter().enumerate() {
@@ -82,12 +82,12 @@ pub(crate) fn median_of(errors: &[f64]) -> Option<usize> {
     order.get(errors.len().saturating_sub(1) / 2).copied()
 }
 
-/// A name as part of a file name.
+/// Makes a name usable in a file name.
 pub(crate) fn file_part(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect()
 }
 
-/// Keeps pictures to look at in the directory that `LNN_TEST_PICTURES` names.
+/// Saves pictures for inspection in the directory that `LNN_TEST_PICTURES` names.
 #[cfg(test)]
 pub(crate) fn save_pictures(figures: &[Figure]) {
     if let Ok(directory) = std::env::var("LNN_TEST_PICTURES") {

@@ -1,4 +1,4 @@
-//! A model as an interactive page: one HTML file with its recorded functions, its weights, and the JavaScript that evaluates them.
+//! A model as an interactive page: an HTML file with the recorded operations, the weights, and JavaScript that evaluates them.
 
 use super::html::{base64, escape};
 use crate::analysis::{mass_matrix_error, mass_matrix_error_within};
@@ -21,33 +21,33 @@ const PLAY: &str = include_str!("page/play.js");
 
 /// Largest page, in bytes.
 const MOST_BYTES: usize = 500_000;
-/// Seconds in which a system without a unit of time crosses the region that the model knows.
+/// Seconds in which a motion crosses the known region on screen, if the system has no unit of time.
 const SECONDS: f64 = 20.0;
-/// States from which a start on the constraints is sought, and at which mass matrices are compared.
+/// Number of states at which a start on the constraints is sought, and mass matrices are compared.
 const STARTS: usize = 24;
 const COMPARED: usize = 200;
 
-/// Why a model has no page.
+/// Why a page cannot be written.
 #[derive(Debug, Error)]
 pub enum PageError {
-    /// Functions that cannot be written as a list of operations.
+    /// A function cannot be written as a list of operations.
     #[error(transparent)]
     Tape(#[from] TapeError),
-    /// Constraints that do not fit the model.
+    /// The constraints do not match the model.
     #[error(transparent)]
     Header(#[from] ModelFileError),
-    /// Constraints that do not fit the system.
+    /// The constraints do not match the system.
     #[error(transparent)]
     System(#[from] SystemError),
-    /// More weights than fit into a page.
+    /// The page would be too large.
     #[error("the page would have {found} bytes, {MOST_BYTES} at most are written: a smaller network has a page")]
     Large {
-        /// A binary file.
+        /// Size of the page in bytes.
         found: usize,
     },
 }
 
-/// The page of a model, with the system that it learned if that is known.
+/// Creates the page of a model and, if it is known, of the system that it learned.
 ///
 /// # Errors
 /// [`PageError`].
@@ -104,7 +104,7 @@ pub fn page(
         "exact": exact,
     });
     let known = if data["exact"].is_null() { "." } else { ", <b class=\"exact\">exact</b>." };
-    // Nothing inside the data may end the element that contains it.
+    // The data must not contain the tag that ends their element.
     let data = data.to_string().replace('<', "\\u003c");
     let text = PAGE.replace("{TITLE}", &escape(&format!("{title}: learned")));
     let text = text.replace("{STYLE}", STYLE).replace("{EXACT}", known).replace("{ENGINE}", ENGINE);
@@ -115,7 +115,7 @@ pub fn page(
     Ok(text)
 }
 
-/// The exact Lagrangian, dissipation and constraints with their parameters.
+/// Collects the exact Lagrangian, dissipation and constraints with their parameters.
 fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, PageError> {
     struct List {
         n: usize,
@@ -149,7 +149,7 @@ fn exact(system: &SystemInstance<f64>) -> Result<Option<Value>, PageError> {
     })))
 }
 
-/// The rows of constraints that vanish along a motion and do not follow from others.
+/// Selects the constraint rows that vanish along a motion and are independent.
 fn rows(
     constraints: &ExpressionConstraints,
     motion: &dyn EulerLagrange<f64>,
@@ -164,12 +164,12 @@ fn rows(
     .collect()
 }
 
-/// Pairs of bounds.
+/// Converts bounds to pairs.
 fn pairs(ranges: &[[f64; 2]]) -> Vec<(f64, f64)> {
     ranges.iter().map(|&[low, high]| (low, high)).collect()
 }
 
-/// A place between sides: shares of them, other ones for every try and, beyond the first, for every coordinate.
+/// Chooses a point in a box; `share` and the number `k` of the attempt determine the relative position along each side.
 fn inside(sides: &[(f64, f64)], share: f64, k: usize) -> Vec<f64> {
     let share = |i: usize| (share + (k * (i + 1)) as f64 * std::f64::consts::SQRT_2).fract();
     sides.iter().enumerate().map(|(i, (low, high))| low + share(i) * (high - low)).collect()
@@ -198,7 +198,7 @@ fn factors(
     Ok(Some(found.factors).filter(|factors| factors.iter().all(|factor| factor.is_finite())))
 }
 
-/// A moving start within the region that the model knows; for a system, among those of its trajectory test, on its mass shell and its
+/// Finds a moving start within the known region; for a system, among the starts of its trajectory test, on its mass shell and its
 /// constraints.
 fn start(
     header: &Header,
@@ -211,7 +211,7 @@ fn start(
     };
     let (q, mut v) = (inside(&positions, 0.3, 0), inside(&velocities, 0.75, 0));
     if let Some(system) = system {
-        // There is a motion off the shell as well.
+        // If that fails, the start may lie off the shell.
         let _ = system.impose_constraint(&q, &mut v);
     }
     let Some(manifold) = motion.manifold() else { return (q, v) };
@@ -225,7 +225,7 @@ fn start(
     tries.find(|(q, _)| known(q)).unwrap_or(first)
 }
 
-/// The shortest time in which a motion from a start crosses the known range of a coordinate, 0 if it crosses none.
+/// Shortest time in which a motion from a start crosses the known range of a coordinate; 0 if it crosses none.
 fn crossing(header: &Header, (_, v): &(Vec<f64>, Vec<f64>), time_like: Option<usize>) -> f64 {
     let widths = header.position.iter().map(|[low, high]| high - low).zip(v).enumerate();
     let times = widths.filter(|(i, _)| Some(*i) != time_like).map(|(_, (width, v))| width / v.abs());
@@ -233,7 +233,7 @@ fn crossing(header: &Header, (_, v): &(Vec<f64>, Vec<f64>), time_like: Option<us
     if least.is_finite() { least } else { 0.0 }
 }
 
-/// The operations as JSON: kind or name, then operands.
+/// Converts the operations to JSON: kind or name, then operands.
 fn operations(listing: &Listing) -> Value {
     let one = |operation: &Operation| match operation {
         Operation::Input(index) => json!(["i", index]),

@@ -1,22 +1,22 @@
-//! Polar coordinates as places in the plane.
+//! Converts polar coordinates to points in the plane.
 
 use super::{Series, Trace, with_unit};
 
-/// A radius and the angles that go with it, among the coordinates of a motion.
+/// Indices of a radius and its angles among the coordinates of a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polar {
     radius: usize,
     angle: usize,
-    /// The angle from the axis of spherical coordinates, which are drawn in the plane of the equator.
+    /// The polar angle of spherical coordinates, which are drawn in the equatorial plane.
     axis: Option<usize>,
-    /// `true` for an angle from the vertical downwards, as the interactive page takes it.
+    /// `true` for an angle that is measured from the downward vertical, as on the interactive page.
     hangs: bool,
     labels: [String; 2],
 }
 
 impl Polar {
-    /// Coordinates called `r` and `phi`, or `r` and `theta`, the latter from the vertical downwards, with the unit of every coordinate; if
-    /// all three exist, they are spherical.
+    /// Recognises coordinates called `r` and `phi`, or `r` and `theta`, where `theta` is measured from the downward vertical; `units` are
+    /// those of the coordinates. If all three exist, they are spherical.
     pub fn of(names: &[String], units: &[String]) -> Option<Self> {
         let place = |wanted: &str| names.iter().position(|name| name == wanted);
         let (radius, phi, theta) = (place("r")?, place("phi"), place("theta"));
@@ -29,14 +29,14 @@ impl Polar {
         Some(Self { radius, angle, axis, hangs, labels: labels.map(|label| with_unit(&label, unit)) })
     }
 
-    /// The place of a position.
+    /// Point in the plane for a position.
     pub fn place(&self, q: &[f64]) -> (f64, f64) {
         let r = q[self.radius] * self.axis.map_or(1.0, |axis| q[axis].sin());
         let (sine, cosine) = q[self.angle].sin_cos();
         if self.hangs { (r * sine, -r * cosine) } else { (r * cosine, r * sine) }
     }
 
-    /// Named paths of positions `(samples, n)`.
+    /// Draws named paths of positions `(samples, n)`.
     pub fn trace(&self, n: usize, paths: &[(&str, &[f64])]) -> Trace {
         let [x_label, y_label] = self.labels.clone();
         let path = |(name, positions): &(&str, &[f64])| Series {

@@ -19,10 +19,10 @@ use axes::TITLE_HEIGHT;
 use std::fmt::Write as _;
 use svg::{Panel, short};
 
-/// Larger numbers are left out: axes need room for arithmetic.
+/// Larger numbers are omitted, so that arithmetic on axes does not overflow.
 const LARGEST: f64 = 1e150;
 
-/// Why there is no picture.
+/// Why a picture cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
@@ -38,7 +38,7 @@ pub struct Series {
     pub name: String,
     /// Points; those that are not finite leave gaps.
     pub points: Vec<(f64, f64)>,
-    /// `true` if to draw it thin over the others, which are then drawn wide: lines that ought to coincide.
+    /// `true` to draw the line thin on top of the others, which are then wide: for lines that should coincide.
     pub over: bool,
 }
 
@@ -48,20 +48,20 @@ impl Series {
         Self { name: name.into(), points: x.iter().copied().zip(y.iter().copied()).collect(), over: false }
     }
 
-    /// A line through points `(angle, other)`, the angle upwards and, if there is a turn, brought into it.
+    /// A line through points `(angle, other)` with the angle on the vertical axis, folded into a turn if one is given.
     pub(crate) fn folded(name: &str, path: Vec<(f64, f64)>, turn: Option<Turn>) -> Self {
         let path = turn.map_or_else(|| path.clone(), |turn| turn.fold(&path));
         Self { name: name.into(), points: path.into_iter().map(|(x, other)| (other, x)).collect(), over: false }
     }
 
-    /// This line, drawn thin over the others.
+    /// Draws this line thin on top of the others.
     #[must_use]
     pub fn over(self) -> Self {
         Self { over: true, ..self }
     }
 }
 
-/// A value that a vertical axis marks by a thin line.
+/// A value that a thin line marks on the vertical axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
     /// The value.
@@ -79,9 +79,9 @@ pub struct LinePlot {
     pub y_label: String,
     /// `true` if the vertical axis is logarithmic; values that are not positive leave gaps.
     pub log_y: bool,
-    /// The turn that the vertical axis shows, for an angle that leaves it somewhere.
+    /// The turn that the vertical axis shows, for angles that leave it.
     pub turn: Option<Turn>,
-    /// A value to be marked.
+    /// Value to be marked.
     pub level: Option<Level>,
     /// `true` to draw the lines grey because they are not determined.
     pub open: bool,
@@ -96,19 +96,19 @@ pub struct Trace {
     pub x_label: String,
     /// Label of the vertical axis, with unit.
     pub y_label: String,
-    /// Paths with a name each. One alone is coloured by time. The first of several is wide, the others are thin over it, and shown as far
-    /// as they stay within its extent of it.
+    /// Named paths. A single path is coloured by time. Of several paths, the first is wide; the others are thin lines on top of it, shown
+    /// up to one extent of the first beyond it.
     pub paths: Vec<Series>,
-    /// `true` if both axes have one scale (a plane of space).
+    /// `true` if both axes have the same scale (a plane in space).
     pub equal: bool,
-    /// The turn that the horizontal axis shows, for an angle that leaves it somewhere.
+    /// The turn that the horizontal axis shows, for angles that leave it.
     pub turn: Option<Turn>,
 }
 
 /// A grid as colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
-    /// The meaning of the colours.
+    /// Title, which states the meaning of the colours.
     pub title: String,
     /// Label of the horizontal axis, with unit.
     pub x_label: String,
@@ -141,7 +141,7 @@ fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// Extremes with room between them, whatever the values.
+/// Extremes of the values, widened if they coincide.
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let (low, high) = extremes(values)?;
     let least = 1e-9 * low.abs().max(high.abs());
@@ -152,7 +152,7 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     Some((low - room, high + room))
 }
 
-/// Range of the first path, and of all as far as within its extent of that range.
+/// Range of the first path, extended to the other paths by at most its own extent.
 fn window(paths: &[Series], part: fn(&(f64, f64)) -> f64) -> Option<(f64, f64)> {
     let all = range(values(paths, part))?;
     let Some((low, high)) = paths.first().and_then(|first| range(values(std::slice::from_ref(first), part))) else {
@@ -161,18 +161,18 @@ fn window(paths: &[Series], part: fn(&(f64, f64)) -> f64) -> Option<(f64, f64)> 
     Some((all.0.max(low - (high - low)), all.1.min(high + (high - low))))
 }
 
-/// Uninterrupted stretches of finite points.
+/// Splits a line into segments of finite points.
 fn stretches(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
     let whole = points.split(|&(x, y)| !(fine(x) && fine(y)));
     whole.filter(|stretch| !stretch.is_empty()).map(<[_]>::to_vec).collect()
 }
 
-/// Fonts of every reader's machine.
+/// Fonts that exist on every machine.
 const FONT: &str = "system-ui,-apple-system,Segoe UI,Roboto,Helvetica,Arial,sans-serif";
-/// Distance of panels.
+/// Distance between panels.
 const GAP: f64 = 8.0;
 
-/// A picture in SVG. A page lets its panels wrap, a file has them in one row.
+/// A picture in SVG. On a page its panels wrap; in a file they form one row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     panels: Vec<Panel>,
@@ -185,12 +185,12 @@ impl Picture {
         self.panels.len()
     }
 
-    /// `true` if it shows nothing but zeros, or a path that stays where it is.
+    /// `true` if it only shows zeros, or a path that does not move.
     pub fn is_blank(&self) -> bool {
         self.blank
     }
 
-    /// The panels of several pictures.
+    /// Combines the panels of several pictures.
     pub fn beside(pictures: impl IntoIterator<Item = Self>) -> Self {
         let start = Self { panels: Vec::new(), blank: true };
         pictures.into_iter().fold(start, |all, next| Self {

@@ -7,12 +7,12 @@ use serde_json::{Map, Value};
 pub struct DataTable {
     /// Names of the columns.
     pub header: Vec<String>,
-    /// Cells, as many in every row.
+    /// Cells; all rows have the same number.
     pub rows: Vec<Vec<Value>>,
 }
 
 impl DataTable {
-    /// Comma-separated values: plain numbers, text in double quotes, nothing where there is no value.
+    /// Formats comma-separated values: plain numbers, text in double quotes, empty fields where there is no value.
     pub fn to_csv(&self) -> String {
         let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
         let cell = |value: &Value| match value {
@@ -25,7 +25,7 @@ impl DataTable {
         format!("{header}\n{}", rows.collect::<String>())
     }
 
-    /// One object per row.
+    /// Converts every row to an object.
     pub fn objects(&self) -> Vec<Map<String, Value>> {
         let object = |row: &Vec<Value>| self.header.iter().cloned().zip(row.iter().cloned()).collect();
         self.rows.iter().map(object).collect()

@@ -1,4 +1,4 @@
-//! Bodies of simple shapes, and turns as MuJoCo writes them.
+//! Bodies of simple shapes, and rotations in MuJoCo's notations.
 
 use super::mjcf::Styled;
 use super::rigid::{Body, Place, turned};
@@ -11,13 +11,13 @@ fn length(x: Vector<f64>) -> f64 {
     x[0].hypot(x[1]).hypot(x[2])
 }
 
-/// A vector of length 1; `None` for a zero vector.
+/// Normalizes a vector; `None` for a zero vector.
 fn unit(x: Vector<f64>) -> Option<Vector<f64>> {
     let length = length(x);
     (length > f64::MIN_POSITIVE && length.is_finite()).then(|| x.map(|x| x / length))
 }
 
-/// The turn of a quaternion `w, x, y, z` of any length.
+/// Rotation matrix of a quaternion `w, x, y, z` of any length.
 pub(super) fn of_quaternion(q: [f64; 4]) -> Option<Matrix<f64>> {
     let size = q[0].hypot(q[1]).hypot(q[2]).hypot(q[3]);
     if !(size > f64::MIN_POSITIVE && size.is_finite()) {
@@ -31,14 +31,14 @@ pub(super) fn of_quaternion(q: [f64; 4]) -> Option<Matrix<f64>> {
     ])
 }
 
-/// The turn about an axis by an angle in rad.
+/// Rotation about an axis by an angle in rad.
 pub(super) fn about(axis: Vector<f64>, angle: f64) -> Option<Matrix<f64>> {
     let (sine, cosine) = (angle / 2.0).sin_cos();
     let [x, y, z] = unit(axis)?;
     of_quaternion([cosine, sine * x, sine * y, sine * z])
 }
 
-/// The turn whose x axis is along the first vector, and whose y axis is in the plane of both.
+/// Rotation whose x axis is along the first vector, and whose y axis is in the plane of both.
 pub(super) fn of_axes(x: Vector<f64>, y: Vector<f64>) -> Option<Matrix<f64>> {
     let x = unit(x)?;
     let along: f64 = x.iter().zip(y).map(|(x, y)| x * y).sum();
@@ -47,7 +47,7 @@ pub(super) fn of_axes(x: Vector<f64>, y: Vector<f64>) -> Option<Matrix<f64>> {
     Some(transposed([x, y, z]))
 }
 
-/// The least turn that puts the z axis along a vector.
+/// Smallest rotation that takes the z axis to a vector.
 pub(super) fn onto(z: Vector<f64>) -> Option<Matrix<f64>> {
     let [x, y, z] = unit(z)?;
     match z > -1.0 + f64::EPSILON {
@@ -56,7 +56,7 @@ pub(super) fn onto(z: Vector<f64>) -> Option<Matrix<f64>> {
     }
 }
 
-/// The body of a geom in the frame of the body that has it.
+/// Computes the body of a geom in the frame of the body that contains it.
 pub(super) fn body(geom: &Styled<'_, '_, '_>) -> Result<Body, Fault> {
     let kind = geom.text("type").unwrap_or("sphere");
     let mass = geom.numbers("mass", &[1])?.map(|mass| mass[0]);
@@ -102,7 +102,7 @@ pub(super) fn body(geom: &Styled<'_, '_, '_>) -> Result<Body, Fault> {
     Ok(Body::about(mass, place.at, &turned(&place.turn, &inertia)))
 }
 
-/// Volume, and mean squares of the coordinates, of shapes about their centres.
+/// Volume of a shape, and mean squares of the coordinates about its centre.
 type Shape = (f64, [f64; 3]);
 
 fn of_ellipsoid([a, b, c]: [f64; 3]) -> Shape {
@@ -113,7 +113,7 @@ fn of_cylinder(radius: f64, half: f64) -> Shape {
     (2.0 * PI * radius * radius * half, [radius * radius / 4.0, radius * radius / 4.0, half * half / 3.0])
 }
 
-/// A cylinder between two halves of a ball, whose centres of mass are `3 r/8` from their faces.
+/// A capsule consists of a cylinder and two half balls, whose centres of mass are `3 r/8` from their faces.
 fn of_capsule(radius: f64, half: f64) -> Shape {
     let (tube, [across, _, along]) = of_cylinder(radius, half);
     let (ball, [round, ..]) = of_ellipsoid([radius; 3]);

@@ -12,22 +12,22 @@ use std::collections::BTreeMap;
 
 type Outcome<T> = Result<T, Fault>;
 
-/// Elements of the world that are read or say nothing of motion.
+/// Elements of the world that are read, or that do not affect the motion.
 const READ: [&str; 8] = ["body", "joint", "geom", "inertial", "site", "camera", "light", "freejoint"];
-/// Elements of the root that are read or say nothing of motion.
+/// Elements of the root that are read, or that do not affect the motion.
 const READ_OF_ROOT: [&str; 8] = ["compiler", "option", "default", "worldbody", "asset", "visual", "statistic", "size"];
-/// Elements with bodies that are not supported: leaving them out would give another robot.
+/// Unsupported elements that contain bodies; ignoring them would change the robot.
 const REFUSED: [&str; 7] = ["include", "frame", "replicate", "composite", "flexcomp", "attach", "plugin"];
-/// Springs and rests of joints, which are not read.
+/// Attributes of joint springs, which are not read.
 const OF_SPRINGS: [&str; 2] = ["stiffness", "springdamper"];
 
 /// Settings of a file, and its defaults by class and element.
 pub(super) struct Settings<'a, 'i> {
-    /// Radians of a unit of angle.
+    /// Value of the unit of angle in radians.
     angle: f64,
-    /// `None` if it is refused.
+    /// `None` for an unsupported sequence of Euler angles.
     euler: Option<bool>,
-    /// `true` if geoms count even when there is an inertial element, `false` if they never count.
+    /// `true` if geoms determine the inertia even if there is an inertial element, `false` if they never do.
     from_geoms: Option<bool>,
     /// A class with the class around it and its own elements.
     classes: BTreeMap<&'a str, (Option<&'a str>, Node<'a, 'i>)>,
@@ -87,7 +87,7 @@ impl<'a, 'i> Settings<'a, 'i> {
         Ok(settings)
     }
 
-    /// An element with its own class, or the one that its body sets.
+    /// Combines an element with its own class, or with the class that its body sets.
     fn styled(&self, node: Node<'a, 'i>, of_body: Option<&'a str>) -> Outcome<Styled<'_, 'a, 'i>> {
         let class = node.attribute("class").or(of_body).or(self.main);
         match class.filter(|class| !self.classes.contains_key(class)) {
@@ -98,7 +98,7 @@ impl<'a, 'i> Settings<'a, 'i> {
 }
 
 impl<'a, 'i> Styled<'_, 'a, 'i> {
-    /// The element that has an attribute: this one, its class, or a class around that.
+    /// Finds the element that defines an attribute: this one, its class, or an enclosing class.
     fn holder(&self, key: &str) -> Node<'a, 'i> {
         let mut class = self.class;
         let mut holder = self.node;
@@ -131,7 +131,7 @@ impl<'a, 'i> Styled<'_, 'a, 'i> {
         Ok(self.numbers(key, &[3])?.map_or(usual, |found| [found[0], found[1], found[2]]))
     }
 
-    /// Its place in the surrounding frame.
+    /// Place of the element in the surrounding frame.
     pub fn place(&self) -> Outcome<Place> {
         let at = self.triple("pos", [0.0; 3])?;
         let degenerate = || fault(self.node, "expected a turn of vectors that are not zero");
@@ -162,7 +162,8 @@ impl<'a, 'i> Styled<'_, 'a, 'i> {
     }
 }
 
-/// A body that waits to be read: the link that carries it, the place of the frame around it there, and the class of its elements.
+/// A body that is still to be read: its element, the link that carries it, the place of the surrounding frame in that link, and the class
+/// of its elements.
 type Waiting<'a, 'i> = (Node<'a, 'i>, Option<usize>, Place, Option<&'a str>);
 
 /// Reads the robot of a root element.
@@ -204,7 +205,7 @@ pub(super) fn read(root: Node<'_, '_>) -> Outcome<Robot> {
     Ok(robot)
 }
 
-/// Puts the bodies within another one on the stack, so that the first one comes off first.
+/// Pushes the bodies inside another one onto the stack, so that the first one is popped first.
 fn push_bodies<'a, 'i>(
     waiting: &mut Vec<Waiting<'a, 'i>>,
     node: Node<'a, 'i>,
@@ -215,7 +216,7 @@ fn push_bodies<'a, 'i>(
     waiting[first..].reverse();
 }
 
-/// The elements that are not read.
+/// Lists the elements that are not read.
 fn left_out(root: Node<'_, '_>, world: Node<'_, '_>) -> Option<String> {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     let of_root = root.children().filter(|node| !READ_OF_ROOT.contains(&node.tag_name().name()));
@@ -235,13 +236,13 @@ fn left_out(root: Node<'_, '_>, world: Node<'_, '_>) -> Option<String> {
 struct Reader<'s, 'a, 'i> {
     settings: &'s Settings<'a, 'i>,
     robot: Robot,
-    /// Joints that are held fixed.
+    /// Joints that are fixed because they are not supported.
     held: Vec<String>,
 }
 
 impl<'a, 'i> Reader<'_, 'a, 'i> {
-    /// Reads a body in a frame of the link that carries it; returns the carrier of the bodies inside, and the place of the body's frame on
-    /// it.
+    /// Reads a body in a frame of the link that carries it; returns the carrier of the bodies inside, and the place of the body's frame in
+    /// that carrier.
     fn read_body(
         &mut self,
         node: Node<'a, 'i>,
@@ -281,7 +282,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok((carrier, place))
     }
 
-    /// The link that a joint moves, as yet without a body.
+    /// Creates the link that a joint moves, without a body for now.
     fn link(
         &self,
         joint: &Styled<'_, 'a, 'i>,
@@ -327,7 +328,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         })
     }
 
-    /// The body of an element, by its inertial or by its geoms.
+    /// Computes the body of an element from its inertial or from its geoms.
     fn body(&self, node: Node<'a, 'i>, class: Option<&'a str>) -> Outcome<Body> {
         if let Some(inertial) = child(node, "inertial")?.filter(|_| self.settings.from_geoms != Some(true)) {
             return self.inertial(&Styled { node: inertial, class: None, settings: self.settings });

@@ -1,5 +1,5 @@
-//! Robots in files of other programs: URDF and MJCF. A file is read as links, and these become the description of a system, as if the
-//! user had written it: `[[links]]` with their constants.
+//! Reads robots from files of other programs: URDF and MJCF. A file is converted to links, and these become the description of a system
+//! with `[[links]]` and constants, as if the user had written it.
 
 mod geoms;
 mod mjcf;
@@ -26,7 +26,7 @@ struct Robot {
     name: String,
     gravity: [f64; 3],
     links: Vec<Link>,
-    /// Elements that are read differently from their meaning, or not at all.
+    /// Notes on elements that are ignored or interpreted differently.
     notes: Vec<String>,
 }
 
@@ -41,17 +41,17 @@ struct Link {
     place: Place,
     axis: [f64; 3],
     slides: bool,
-    /// `true` for a joint that turns without end.
+    /// `true` for a joint without limits.
     is_free: bool,
     bounds: Option<(f64, f64)>,
     speed: Option<f64>,
-    /// The whole, about the frame of the joint.
+    /// Combined body, about the frame of the joint.
     body: Body,
     /// Its parts: names of links in the file, with their places and bodies; the link itself first.
     parts: Vec<Part>,
-    /// Inertia of the drive, viscous and dry friction.
+    /// Inertia of the drive, viscous friction and dry friction.
     losses: [f64; 3],
-    /// Index of the link whose coordinate moves it, ratio and offset.
+    /// For a mimic joint: index of the link whose coordinate moves it, ratio and offset.
     follows: Option<(usize, f64, f64)>,
 }
 
@@ -63,12 +63,12 @@ struct Part {
     body: Body,
 }
 
-/// `true` if a file is that of a robot, by its name.
+/// `true` if the file name has the extension of a robot file.
 pub fn is_robot(path: &Path) -> bool {
     path.extension().is_some_and(|end| ["urdf", "xml"].iter().any(|known| end.eq_ignore_ascii_case(known)))
 }
 
-/// The system of a robot's file, and remarks on parts of the file that were not read.
+/// Parses the system in a robot file; also returns remarks on parts of the file that were not read.
 ///
 /// # Errors
 /// Line, from 1, and what is wrong there.
@@ -78,7 +78,7 @@ pub fn parse_robot(text: &str) -> Result<(System, Vec<String>), Fault> {
     Ok((system, robot.notes))
 }
 
-/// A robot, and the line of its root.
+/// Reads a robot; also returns the line of its root.
 fn read(text: &str) -> Result<(Robot, usize), Fault> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let document = xml::parse(text)?;
@@ -96,7 +96,7 @@ fn read(text: &str) -> Result<(Robot, usize), Fault> {
 }
 
 impl Robot {
-    /// Its system: first a description without constants, which lists them, then one with the values of the file.
+    /// Creates the system: first a description without constants, which lists them, then one with the values of the file.
     fn system(&mut self) -> Result<System, String> {
         let table = self.table();
         let description: Description =
@@ -108,7 +108,7 @@ impl Robot {
         full.system().map_err(|error| error.to_string())
     }
 
-    /// Constants of the links and joints, by symbol.
+    /// Lists the constants of the links and joints, by symbol.
     fn constants(&self) -> Vec<(String, f64)> {
         let of = |(k, link): (usize, &Link)| {
             let bodies = inertia_symbols(k + 1).into_iter().zip(link.body.0);
@@ -117,7 +117,7 @@ impl Robot {
         self.links.iter().enumerate().flat_map(of).collect()
     }
 
-    /// The description without constants.
+    /// Writes the description without constants.
     fn table(&mut self) -> Table {
         let numbers = |x: &[f64]| Value::Array(x.iter().map(|&x| Value::Float(x)).collect());
         let mut chain = Table::new();
@@ -157,7 +157,7 @@ impl Robot {
         table
     }
 
-    /// A name as systems have them.
+    /// Converts the name to one that systems may have.
     fn plain_name(&self) -> String {
         let plain = |c: char| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '-' };
         let name: String = self.name.chars().map(plain).take(60).collect();
@@ -168,7 +168,7 @@ impl Robot {
         }
     }
 
-    /// Coordinates with the names of the joints, as far as formulas can have them.
+    /// Names the coordinates after the joints, as far as formulas allow such names.
     fn coordinates(&mut self) -> Vec<Value> {
         let constants: Vec<String> = self.constants().into_iter().map(|(name, _)| name).collect();
         let (mut names, mut renamed): (Vec<String>, Vec<String>) = (Vec::new(), Vec::new());
@@ -204,12 +204,12 @@ impl Robot {
     }
 }
 
-/// `true` if a name can be shown.
+/// `true` if a name is printable.
 fn is_shown(name: &str) -> bool {
     !name.is_empty() && name.chars().count() <= 100 && !name.chars().any(char::is_control)
 }
 
-/// `true` if a coordinate cannot have a name: something else in the description or in results has it.
+/// `true` if a name cannot be used for a coordinate, because the description or the results already use it.
 fn is_taken(name: &str, constants: &[String], names: &[String]) -> bool {
     let ends = ["_dot", "_ddot", "_force"];
     // Definitions of links, such as `link1_wx`.

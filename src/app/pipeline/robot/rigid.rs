@@ -5,7 +5,7 @@ use crate::linalg::{Workspace, inverse, is_positive_definite};
 
 const SAME: Matrix<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// The place of a frame, seen from another one: `x' = R x + p`.
+/// The place of a frame in another one: `x' = R x + p`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
     pub turn: Matrix<f64>,
@@ -15,7 +15,7 @@ pub(super) struct Place {
 impl Place {
     pub const HERE: Self = Self { turn: SAME, at: [0.0; 3] };
 
-    /// The place of a frame that is given relative to this one.
+    /// Composes this place with one that is relative to it.
     pub fn then(&self, next: &Self) -> Self {
         let at = applied(&self.turn, next.at);
         Self { turn: product(&self.turn, &next.turn), at: std::array::from_fn(|i| self.at[i] + at[i]) }
@@ -38,7 +38,7 @@ impl Place {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Body(pub [f64; 10]);
 
-/// Contribution to the inertia of a body from the distance of its centre of mass: `m (c^2 - c c^T)`.
+/// Difference between the inertia about the origin and the inertia about the centre of mass (Steiner): `m (c^2 - c c^T)`.
 fn shifted(mass: f64, c: Vector<f64>) -> Matrix<f64> {
     let square: f64 = c.iter().map(|c| c * c).sum();
     std::array::from_fn(|i| std::array::from_fn(|j| mass * (f64::from(u8::from(i == j)) * square - c[i] * c[j])))
@@ -49,14 +49,14 @@ fn sum(a: &Matrix<f64>, b: &Matrix<f64>, factor: f64) -> Matrix<f64> {
 }
 
 impl Body {
-    /// A body of a mass, a centre of mass and the inertia about it.
+    /// Creates a body from its mass, its centre of mass and the inertia about that.
     pub fn about(mass: f64, centre: Vector<f64>, inertia: &Matrix<f64>) -> Self {
         let i = sum(inertia, &shifted(mass, centre), 1.0);
         let [x, y, z] = centre.map(|c| mass * c);
         Self([mass, x, y, z, i[0][0], i[0][1], i[0][2], i[1][1], i[1][2], i[2][2]])
     }
 
-    /// Mass, centre of mass and inertia about it; of a body without mass all of them are 0 but the inertia.
+    /// Mass, centre of mass and inertia about it; for a massless body only the inertia can differ from 0.
     pub fn central(&self) -> (f64, Vector<f64>, Matrix<f64>) {
         let [m, x, y, z, xx, xy, xz, yy, yz, zz] = self.0;
         let about_origin = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
@@ -67,7 +67,7 @@ impl Body {
         (m, centre, sum(&about_origin, &shifted(m, centre), -1.0))
     }
 
-    /// The body, seen from the frame in which its own frame has a place.
+    /// Transforms the body from its own frame, which has this place, to the surrounding frame.
     pub fn seen(&self, place: &Place) -> Self {
         let (mass, centre, inertia) = self.central();
         let at = place.then(&Place { turn: SAME, at: centre }).at;
@@ -84,7 +84,7 @@ pub(super) fn turned(turn: &Matrix<f64>, inertia: &Matrix<f64>) -> Matrix<f64> {
     product(&product(turn, inertia), &transposed(*turn))
 }
 
-/// The turn back.
+/// Inverse rotation.
 pub(super) fn back(turn: &Matrix<f64>) -> Matrix<f64> {
     transposed(*turn)
 }
@@ -92,7 +92,7 @@ pub(super) fn back(turn: &Matrix<f64>) -> Matrix<f64> {
 type Square = [f64; 16];
 
 impl Body {
-    /// The pseudo-inertia `[[tr(I)/2 E - I, h], [h', m]]`, positive definite for all that has an extent in every direction.
+    /// The pseudo-inertia `[[tr(I)/2 E - I, h], [h', m]]`; it is positive definite for a physical body that extends in all directions.
     fn moments(&self) -> Square {
         let [m, x, y, z, xx, xy, xz, yy, yz, zz] = self.0;
         let half = (xx + yy + zz) / 2.0;
@@ -104,7 +104,7 @@ impl Body {
         Self([p[15], p[3], p[7], p[11], yy + zz, -p[1], -p[2], xx + zz, -p[6], xx + yy])
     }
 
-    /// The lower factor `C` of `P = C C^T`; `None` if no physical body with an extent has these constants.
+    /// Cholesky factor `C` of `P = C C^T`; `None` if no physical body that extends in all directions has these constants.
     fn factor(&self) -> Option<Square> {
         let mut pivots = [0.0; 16];
         is_positive_definite(4, &self.moments(), &mut pivots).then(|| {
@@ -113,13 +113,13 @@ impl Body {
         })
     }
 
-    /// `true` if a body with an extent has these constants.
+    /// `true` if a physical body that extends in all directions has these constants.
     pub fn exists(&self) -> bool {
         self.factor().is_some()
     }
 
-    /// Bodies that together are `whole`, each from its own part by the linear map of space that turns the sum of the parts into the whole.
-    /// It transforms all mass equally, so that physical parts stay physical. `None` if there is no such map.
+    /// Transforms bodies by the linear map of space that turns their sum into `whole`. It transforms all mass equally, so physical parts
+    /// remain physical. `None` if there is no such map.
     pub fn stretched(parts: &[Self], whole: &Self) -> Option<Vec<Self>> {
         let sum = parts.iter().fold(Self::default(), |sum, part| sum.plus(part, 1.0));
         let (mut inverted, to) = ([0.0; 16], whole.factor()?);

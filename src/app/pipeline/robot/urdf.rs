@@ -9,7 +9,7 @@ use crate::pipeline::thresholds::{GRAVITY, MAX_ELEMENTS};
 use roxmltree::Node;
 use std::collections::BTreeMap;
 
-/// Elements that say nothing of motion.
+/// Elements that do not affect the motion.
 const OF_LOOKS: [&str; 3] = ["visual", "collision", "material"];
 /// Elements that are read: of the robot, of a link, of a joint.
 const READ: [&[&str]; 3] =
@@ -17,7 +17,7 @@ const READ: [&[&str]; 3] =
 
 type Outcome<T> = Result<T, Fault>;
 
-/// The elements of a file by name, unprocessed.
+/// The elements of a file by name, not yet interpreted.
 struct Elements<'a, 'i> {
     links: BTreeMap<&'a str, Node<'a, 'i>>,
     joints: Vec<Element<'a, 'i>>,
@@ -32,17 +32,17 @@ struct Element<'a, 'i> {
     child: &'a str,
 }
 
-/// Joints by their order in the file, each with the link that carries its parent and the place of the parent in the frame of that.
+/// Joints to be read by their order in the file, each with the link that carries its parent, and the place of the parent in that link.
 type Waiting<'e, 'a, 'i> = BTreeMap<usize, (&'e Element<'a, 'i>, Option<usize>, Place)>;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Fixed,
-    /// Turns without end.
+    /// Rotates without limits.
     Continuous,
     Revolute,
     Prismatic,
-    /// A joint with several coordinates, or of unknown type; held fixed.
+    /// A joint with several coordinates or of an unknown type; it is fixed.
     Other,
 }
 
@@ -136,7 +136,7 @@ impl<'a, 'i> Elements<'a, 'i> {
         Ok(Self { links, joints })
     }
 
-    /// The one link that no joint moves.
+    /// Finds the only link that no joint moves.
     fn base(&self, root: Node<'_, '_>) -> Outcome<&'a str> {
         let is_free = |name: &&&str| !self.joints.iter().any(|joint| joint.child == **name);
         let free: Vec<&&str> = self.links.keys().filter(is_free).collect();
@@ -150,7 +150,7 @@ impl<'a, 'i> Elements<'a, 'i> {
         }
     }
 
-    /// Lets the joints of a link wait.
+    /// Adds the joints of a link to the waiting list.
     fn push_children<'e>(
         &'e self,
         waiting: &mut Waiting<'e, 'a, 'i>,
@@ -160,7 +160,7 @@ impl<'a, 'i> Elements<'a, 'i> {
         waiting.extend(own.map(|(at, joint)| (at, (joint, carrier, place))));
     }
 
-    /// The elements that are not read.
+    /// Lists the elements that are not read.
     fn left_out(&self, root: Node<'_, '_>) -> Vec<String> {
         let mut notes = Vec::new();
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
@@ -187,7 +187,7 @@ impl<'a, 'i> Elements<'a, 'i> {
         notes
     }
 
-    /// Lets joints with `<mimic>` follow the joints that have coordinates of their own.
+    /// Connects joints with `<mimic>` to the joints that they follow.
     fn follow(&self, robot: &mut Robot, numbers: &BTreeMap<&str, Option<usize>>) -> Outcome<()> {
         for joint in self.joints.iter().filter(|joint| joint.moves()) {
             let Some(own) = numbers.get(joint.name).copied().flatten() else { continue };
@@ -223,7 +223,7 @@ impl Element<'_, '_> {
         !matches!(self.kind, Kind::Fixed | Kind::Other)
     }
 
-    /// The link that the joint moves.
+    /// Creates the link that the joint moves.
     fn link(&self, (parent, place): (Option<usize>, Place), part: Part) -> Outcome<Link> {
         let slides = self.kind == Kind::Prismatic;
         let axis = child(self.node, "axis")?.map_or(Ok([1.0, 0.0, 0.0]), |node| {
@@ -275,7 +275,7 @@ pub(super) fn origin(node: Node<'_, '_>) -> Outcome<Place> {
     Ok(Place { turn: turned(triple(origin, "rpy", [0.0; 3])?), at: triple(origin, "xyz", [0.0; 3])? })
 }
 
-/// The body of a link; of one without `<inertial>` it has no mass.
+/// Reads the body of a link; without `<inertial>` it has no mass.
 fn inertial(link: Node<'_, '_>) -> Outcome<Body> {
     let Some(node) = child(link, "inertial")? else { return Ok(Body::default()) };
     let place = origin(node)?;

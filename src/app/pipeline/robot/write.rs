@@ -1,4 +1,4 @@
-//! A URDF with other constants: the text stays, and only the numbers of inertials and of the dynamics of joints are replaced.
+//! Writes new constants into a URDF: only the numbers of inertials and of joint dynamics are replaced.
 
 use super::rigid::{Body, Place, back, turned};
 use super::urdf::origin;
@@ -12,10 +12,10 @@ use std::ops::Range;
 /// Ranges of a text with their replacements.
 struct Edits(Vec<(Range<usize>, String)>);
 
-/// The text of a URDF with new values of constants by symbol; missing and unchanged constants change nothing.
+/// Replaces constants, given by symbol, in the text of a URDF; missing and unchanged constants change nothing.
 ///
-/// Parts fixed to a link keep their bodies, and the link takes the rest. If the rest is not a physical body, all parts are transformed by
-/// the same map.
+/// Parts fixed to a link keep their bodies, and the remainder becomes the body of the link itself. If the remainder is not a physical body,
+/// all parts are transformed by the same map.
 ///
 /// # Errors
 /// Line, from 1, and what is wrong there: with the file, or with the constants of a link.
@@ -70,7 +70,7 @@ pub fn rewrite_robot(text: &str, values: &[(&str, f64)]) -> Result<String, Fault
     Ok(written)
 }
 
-/// The bodies of the parts of a link, each in its own frame; `None` for the first if no body is possible.
+/// Distributes a body over the parts of a link, each in its own frame; the first is `None` if no physical distribution exists.
 fn shares(link: &Link, whole: &Body) -> Vec<Option<Body>> {
     let seen: Vec<Body> = link.parts.iter().map(|part| part.body.seen(&part.place)).collect();
     let rest = seen[1..].iter().fold(*whole, |rest, part| rest.plus(part, -1.0));
@@ -92,7 +92,7 @@ fn shares(link: &Link, whole: &Body) -> Vec<Option<Body>> {
 }
 
 impl Edits {
-    /// The text with them.
+    /// Applies the edits to a text.
     fn applied_to(mut self, text: &str) -> String {
         // Edits at the same place keep their order.
         self.0.sort_by_key(|(range, _)| range.start);
@@ -120,7 +120,7 @@ impl Edits {
         }
     }
 
-    /// Puts elements into another one, before its content.
+    /// Inserts elements at the beginning of another one.
     fn insert(&mut self, node: Node<'_, '_>, elements: &str) {
         let (text, range) = (node.document().input_text(), node.range());
         let line = text[..range.start].rfind('\n').map_or(0, |at| at + 1);
@@ -144,7 +144,7 @@ impl Edits {
         }
     }
 
-    /// Gives a link this body about the origin of its frame. A rotated inertial keeps its rotation.
+    /// Sets the body of a link, given about the origin of its frame. A rotated inertial keeps its rotation.
     fn set_body(&mut self, link: Node<'_, '_>, body: &Body) -> Result<(), Fault> {
         let (mass, centre, inertia) = body.central();
         let node = child(link, "inertial")?;
@@ -177,7 +177,7 @@ impl Edits {
         Ok(())
     }
 
-    /// Gives a joint these constants of viscous and dry friction, where they differ from its own.
+    /// Sets viscous and dry friction of a joint if they differ from the present values.
     fn set_dynamics(&mut self, joint: Node<'_, '_>, [viscous, dry]: [f64; 2], before: [f64; 2]) -> Result<(), Fault> {
         let both = [("damping", viscous, before[0]), ("friction", dry, before[1])];
         let changed = both.iter().filter(|(_, new, old)| new != old);
@@ -190,7 +190,7 @@ impl Edits {
     }
 }
 
-/// `true` if two attributes have the same numbers up to rounding, over the largest of them.
+/// `true` if two attributes have equal numbers up to rounding relative to the largest of them.
 fn is_same(before: &str, after: &str) -> bool {
     let numbers = |text: &str| text.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
     let (Some(before), Some(after)) = (numbers(before), numbers(after)) else { return false };
@@ -198,13 +198,13 @@ fn is_same(before: &str, after: &str) -> bool {
     before.len() == after.len() && before.iter().zip(&after).all(|(a, b)| (a - b).abs() <= SAME_NUMBER * size)
 }
 
-/// An element without content.
+/// Formats an element without content.
 fn element(tag: &str, attributes: &[(&str, String)]) -> String {
     let own: String = attributes.iter().map(|(key, x)| format!(" {key}=\"{x}\"")).collect();
     format!("<{tag}{own}/>")
 }
 
-/// A number that reads back exactly, without a decimal point if it needs none.
+/// Formats a number without loss, without a decimal point if it needs none.
 fn number(x: f64) -> String {
     let text = format!("{:?}", x + 0.0);
     text.strip_suffix(".0").map(String::from).unwrap_or(text)

@@ -1,31 +1,31 @@
-//! Elements of a robot file: their numbers, their names, and where a mistake is.
+//! Access to the elements of a robot file: numbers, names, and positions of mistakes.
 
 use crate::pipeline::thresholds::{MAX_NODES, SHOWN_ITEMS};
 use roxmltree::{Document, Node, ParsingOptions};
 
-/// Line, from 1, and what is wrong there.
+/// Line, from 1, and description of the mistake.
 pub(super) type Fault = (usize, String);
 
-/// The document of a text.
+/// Parses a document.
 pub(super) fn parse(text: &str) -> Result<Document<'_>, Fault> {
     let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     Document::parse_with_options(text, options)
         .map_err(|error| ((error.pos().row as usize).max(1), format!("no XML: {error}")))
 }
 
-/// A mistake in an element.
+/// Creates the fault for a mistake in an element.
 pub(super) fn fault(node: Node<'_, '_>, problem: impl std::fmt::Display) -> Fault {
     let line = node.document().text_pos_at(node.range().start).row as usize;
     let named = node.attribute("name").map_or(String::new(), |name| format!(" name={name:?}"));
     (line.max(1), format!("<{}{named}>: {problem}", node.tag_name().name()))
 }
 
-/// Child elements of a name.
+/// Child elements with this name.
 pub(super) fn children<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> impl Iterator<Item = Node<'a, 'i>> {
     node.children().filter(move |child| child.has_tag_name(tag))
 }
 
-/// The one child element of a name, if there is one.
+/// The only child element with this name, if there is one.
 pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Result<Option<Node<'a, 'i>>, Fault> {
     let mut found = children(node, tag);
     let first = found.next();
@@ -35,12 +35,12 @@ pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Result<Option<Node
     }
 }
 
-/// An attribute that must be there.
+/// Returns a required attribute.
 pub(super) fn required<'a>(node: Node<'a, '_>, key: &str) -> Result<&'a str, Fault> {
     node.attribute(key).ok_or_else(|| fault(node, format!("missing attribute `{key}`")))
 }
 
-/// Finite numbers of an attribute, separated by spaces, if it exists; their count must be one of `allowed`.
+/// Parses the finite numbers of an optional attribute, separated by spaces; their count must be one of `allowed`.
 pub(super) fn numbers(node: Node<'_, '_>, key: &str, allowed: &[usize]) -> Result<Option<Vec<f64>>, Fault> {
     let Some(text) = node.attribute(key) else { return Ok(None) };
     let read = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite());
@@ -62,17 +62,17 @@ pub(super) fn numbers(node: Node<'_, '_>, key: &str, allowed: &[usize]) -> Resul
     }
 }
 
-/// A finite number of an attribute, if it is there.
+/// Parses the finite number of an optional attribute.
 pub(super) fn number(node: Node<'_, '_>, key: &str) -> Result<Option<f64>, Fault> {
     Ok(numbers(node, key, &[1])?.map(|found| found[0]))
 }
 
-/// Three finite numbers of an attribute, or the usual ones.
+/// Parses three finite numbers of an attribute; `usual` is the default.
 pub(super) fn triple(node: Node<'_, '_>, key: &str, usual: [f64; 3]) -> Result<[f64; 3], Fault> {
     Ok(numbers(node, key, &[3])?.map_or(usual, |found| [found[0], found[1], found[2]]))
 }
 
-/// Items separated by commas, shortened if there are too many to read.
+/// Joins items by commas, shortened if there are too many.
 pub(super) fn list(items: &[String]) -> String {
     match items.len() {
         count if count > SHOWN_ITEMS => format!("{} and {} more", items[..SHOWN_ITEMS].join(", "), count - SHOWN_ITEMS),

@@ -1,4 +1,4 @@
-//! Axes: where a value lies, ticks and their texts, the frame around the data.
+//! Axes: positions of values, ticks with their texts, and the frame around the data.
 
 use super::svg::{Anchor, GRID, INK, Panel, fitting, text_width};
 use std::f64::consts::PI;
@@ -7,14 +7,14 @@ use std::f64::consts::PI;
 const TICK: f64 = 12.0;
 /// Size of labels.
 const LABEL: f64 = 13.0;
-/// Height of the line of a title, and of the room above data without one.
+/// Height of a title line, and of the margin above data without title.
 pub(super) const TITLE_HEIGHT: f64 = 28.0;
 pub(super) const TOP: f64 = 12.0;
 /// Height of a row of a legend.
 pub(super) const ROW: f64 = 18.0;
-/// Height below the data.
+/// Height of the margin below the data.
 pub(super) const BELOW: f64 = 44.0;
-/// Decades that have ticks of their own at every value.
+/// Largest number of decades for which every multiple of a power of ten has a tick.
 const FEW_DECADES: f64 = 6.0;
 
 /// Scale of an axis.
@@ -22,7 +22,7 @@ const FEW_DECADES: f64 = 6.0;
 pub(super) enum AxisScale {
     Linear,
     Logarithmic,
-    /// Radians, ticks at parts of pi.
+    /// Radians with ticks at multiples of fractions of pi.
     Angle,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct Axis {
     pub label: String,
 }
 
-/// A tick and its text; none for a minor one.
+/// A tick and its text; minor ticks have none.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tick {
     pub at: f64,
@@ -55,7 +55,7 @@ impl Axis {
         }
     }
 
-    /// About `most` ticks, and the power of ten that their texts leave out.
+    /// Computes about `most` ticks, and the power of ten that their texts omit.
     pub fn ticks(&self, most: usize) -> (Vec<Tick>, i32) {
         match self.kind {
             AxisScale::Linear => self.linear(most),
@@ -100,7 +100,7 @@ impl Axis {
         ticks
     }
 
-    /// The label, and the power of ten that the ticks leave out.
+    /// The label with the power of ten that the ticks omit.
     fn labelled(&self, power: i32) -> String {
         match power {
             0 => self.label.clone(),
@@ -109,7 +109,7 @@ impl Axis {
     }
 }
 
-/// `step` rounded up to 1, 2 or 5 times a power of ten, and the exponent of its last digit.
+/// Rounds a step up to 1, 2 or 5 times a power of ten; also returns the exponent of its last digit.
 fn step(least: f64) -> (f64, i32) {
     let power = least.log10().floor() as i32;
     let unit = 10f64.powi(power);
@@ -120,12 +120,12 @@ fn step(least: f64) -> (f64, i32) {
 /// Multiples of `step` within bounds.
 fn multiples(low: f64, high: f64, step: f64) -> Vec<f64> {
     let (from, to) = ((low / step - 1e-6).ceil(), (high / step + 1e-6).floor());
-    // Few whatever the numbers.
+    // The number is limited for any input.
     let count = (to - from).clamp(-1.0, 50.0) as i64;
     (0..=count).map(|k| (from + k as f64) * step + 0.0).collect()
 }
 
-/// `quarters` of pi.
+/// Formats multiples of pi/4.
 fn parts_of_pi(quarters: i64) -> String {
     let sign = if quarters < 0 { "\u{2212}" } else { "" };
     let (over, under) = match quarters.abs() {
@@ -172,19 +172,19 @@ impl Area {
     }
 }
 
-/// Ticks of a vertical axis of this height.
+/// Computes the ticks of a vertical axis of this height.
 fn upright(y: &Axis, height: f64) -> (Vec<Tick>, i32) {
     y.ticks((height / 42.0).max(2.0) as usize)
 }
 
-/// Room left of the data for label and ticks of a vertical axis.
+/// Margin left of the data for label and ticks of a vertical axis.
 pub(super) fn room_left(y: &Axis, height: f64) -> f64 {
     let ticks = upright(y, height).0;
     let widest = ticks.iter().filter_map(|tick| tick.text.as_ref()).map(|text| text_width(text, TICK));
     widest.fold(0.0, f64::max) + 34.0
 }
 
-/// Draws title, axes, ticks and a grid around an area; the data come over it.
+/// Draws title, axes, ticks and grid around an area; the data are drawn on top.
 pub(super) fn frame(panel: &mut Panel, area: Area, axes: (&Axis, &Axis), title: &str) {
     let grid = ruled(panel, area, axes, title);
     panel.segments(&grid, GRID, 0.7);
@@ -199,7 +199,7 @@ pub(super) fn ruled(panel: &mut Panel, area: Area, (x, y): (&Axis, &Axis), title
         panel.title(left, title);
     }
 
-    // As many ticks as there is room for their texts.
+    // Uses as many ticks as their texts have room for.
     let fits = |most: &usize| {
         let widest =
             x.ticks(*most).0.iter().filter_map(|t| t.text.as_ref()).map(|t| text_width(t, TICK)).fold(0.0, f64::max);
@@ -251,7 +251,7 @@ pub(super) fn ruled(panel: &mut Panel, area: Area, (x, y): (&Axis, &Axis), title
     grid
 }
 
-/// Text of a single number: four digits.
+/// Formats a number with four digits.
 pub(super) fn number(x: f64) -> String {
     if x == 0.0 || x.abs() < 1e-300 {
         return "0".into();

@@ -7,13 +7,13 @@ use super::{HeatMap, Picture, PlotError, extremes, fine};
 
 /// Size of a panel.
 const SIZE: (f64, f64) = (332.0, 286.0);
-/// Width of a colour bar, room left of it.
+/// Width of a colour bar, and the margin left of it.
 const BAR: (f64, f64) = (11.0, 10.0);
-/// Size of its texts.
+/// Font size of its texts.
 const TEXT: f64 = 12.0;
-/// Number of colours of a map, and of one with greyed-out points, which need as many more; another colour marks gaps.
+/// Number of colours in a map, and in a map with greyed-out points, which need a second set; one more colour marks gaps.
 const SHADES: (usize, usize) = (255, 127);
-/// How much of a colour remains where it is greyed out.
+/// Share of a colour that remains if it is greyed out.
 const LEFT: f64 = 0.18;
 
 /// Draws grids side by side, each with its colour bar; gaps are grey.
@@ -34,7 +34,7 @@ fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
     if columns < 2 || rows < 2 || grid.values.len() != columns * rows {
         return Err(empty());
     }
-    // A point is the middle of its square.
+    // Each point is the centre of its cell.
     let edges = |axis: &[f64]| {
         let half = 0.5 * (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64;
         (axis[0] - half, axis[axis.len() - 1] + half)
@@ -85,7 +85,7 @@ fn panel(map: &HeatMap) -> Result<Panel, PlotError> {
     inner.dots(&marks, MARK, 1.6);
     panel.inset((area.left, area.top), &inner);
     let title = if constant { format!("{} = {}", map.title, number(low)) } else { map.title.clone() };
-    // Lines across would be taken for data.
+    // Grid lines over the map could be mistaken for data, so they are not drawn.
     let _ = ruled(&mut panel, area, axes, &title);
     if !constant {
         let bar: Vec<Vec<u8>> = (0..shades as u8).rev().map(|k| vec![k]).collect();
@@ -107,7 +107,7 @@ fn bar_ticks(from: f64, to: f64) -> Vec<(f64, String)> {
     ticks.into_iter().map(text).collect()
 }
 
-/// A colour mixed with grey for undetermined values.
+/// Mixes a colour with grey to mark undetermined values.
 fn greyed(colour: [u8; 3]) -> [u8; 3] {
     std::array::from_fn(|i| (LEFT * f64::from(colour[i]) + (1.0 - LEFT) * f64::from(GAP[i])).round() as u8)
 }

@@ -1,4 +1,4 @@
-//! Lines over a common axis, with no more points than an eye can see.
+//! Lines over a common axis, reduced to the points that are visible.
 
 use super::axes::{Area, Axis, AxisScale, BELOW, ROW, TOP, frame, room_left};
 use super::svg::{INK, LINES, OVER, Panel, UNDER, entry_width, fitting};
@@ -6,17 +6,17 @@ use super::{LinePlot, Picture, PlotError, Series, range, stretches, values, wind
 
 /// Size of the picture without its legend.
 const SIZE: (f64, f64) = (496.0, 288.0);
-/// Room right of the data.
+/// Margin right of the data.
 const RIGHT: f64 = 14.0;
-/// Decades below the largest value that a logarithmic axis shows.
+/// Smallest value of a logarithmic axis relative to the largest.
 const DECADES: f64 = 1e-18;
 /// Width of a line.
 const WIDTH: f64 = 1.3;
-/// Width of lines that oscillate so fast that several would fill the picture.
+/// Width of lines with fast oscillations, several of which would otherwise fill the picture.
 const DENSE: f64 = 0.7;
-/// Number of points at and above which a line may be one of these.
+/// Fewest points of such a line.
 const MANY: usize = 500;
-/// The colour of lines for undetermined quantities.
+/// Colour of lines for undetermined quantities.
 const OPEN: &str = "#9aa1ad";
 
 /// Draws lines.
@@ -35,12 +35,12 @@ pub fn line_plot(plot: &LinePlot) -> Result<Picture, PlotError> {
             }
         }
     }
-    // A diverging line does not shrink the one that it is drawn over.
+    // A diverging line must not shrink the line that it is compared with.
     let overlaid = series.iter().any(|s| s.over);
     let y = if overlaid { window(&series, |p| p.1) } else { range(values(&series, |p| p.1)) };
     let (y, x) = (y.ok_or_else(empty)?, all_x.ok_or_else(empty)?);
     let blank = values(&series, |p| p.1).all(|y| y == 0.0);
-    // Points without lines want room around them.
+    // Isolated points need a margin around them.
     let scattered = series.iter().all(|s| stretches(&s.points).iter().all(|stretch| stretch.len() == 1));
     let margin = if scattered { 0.04 * (x.1 - x.0) } else { 0.0 };
     let x = Axis::new(x.0 - margin, x.1 + margin, AxisScale::Linear, &plot.x_label);
@@ -113,7 +113,7 @@ fn look(plot: &LinePlot, index: usize) -> (&'static str, f64, f64) {
     (if plot.open { OPEN } else { LINES[index % LINES.len()] }, if dense { DENSE } else { width }, 4.0)
 }
 
-/// Row, position, series and name of every entry of a legend, if there are several series.
+/// Row, position, series and name of every legend entry, if there are several series.
 fn legend(series: &[Series], room: f64) -> Vec<(usize, f64, usize, String)> {
     let (mut row, mut place, mut entries) = (0, 0.0, Vec::new());
     let named = series.iter().enumerate().filter(|(_, s)| series.len() > 1 && !s.name.is_empty());
@@ -128,10 +128,10 @@ fn legend(series: &[Series], room: f64) -> Vec<(usize, f64, usize, String)> {
     entries
 }
 
-/// Points beyond which a path is simplified in pieces: the work grows with the square of a piece in the worst case.
+/// Number of points per piece of a path that is simplified: in the worst case, the work grows with the square of that number.
 const PIECE: usize = 400;
 
-/// Points of a pixel that are worth keeping each.
+/// Number of points per pixel up to which all points are kept.
 const FEW: usize = 8;
 
 /// A path that runs from left to right, without most points of crowded pixels: each pixel keeps the first, last, lowest and highest. Any

@@ -6,9 +6,9 @@ use super::{Picture, PlotError, Series, Trace, fine, range, stretches, values, w
 
 /// Size of a panel.
 const SIZE: (f64, f64) = (420.0, 428.0);
-/// Room right of the data.
+/// Margin right of the data.
 const RIGHT: f64 = 14.0;
-/// Colour of a hole.
+/// Colour of the disc around the origin.
 const HOLE: &str = "#c3c9d4";
 
 /// Orbits in a plane around the origin.
@@ -20,7 +20,7 @@ pub struct OrbitPlot {
     pub y_label: String,
     /// Radius of a disc around the origin, such as a horizon.
     pub hole: Option<f64>,
-    /// Panels: title and orbits of each. The panel shows the orbits that are not `over` completely, or all if there are no others.
+    /// Panels, each with title and orbits. The orbits that are not `over` determine the range of a panel; without such orbits, all do.
     pub panels: Vec<(String, Vec<Series>)>,
 }
 
@@ -66,7 +66,7 @@ fn draw(plot: &OrbitPlot, title: &str, orbits: &[Series]) -> Result<Panel, PlotE
     for over in [false, true] {
         for (index, orbit) in orbits.iter().enumerate().filter(|(_, orbit)| orbit.over == over) {
             let look = if over { (LINES[index % LINES.len()], OVER) } else { UNDER };
-            // Any position outside will do.
+            // Any position outside the panel is suitable.
             let near =
                 |(x, y): (f64, f64)| (x.clamp(-area.width, 2.0 * area.width), y.clamp(-area.height, 2.0 * area.height));
             let lines = stretches(&orbit.points).into_iter().filter(|stretch| stretch.len() > 1);
@@ -84,9 +84,9 @@ fn draw(plot: &OrbitPlot, title: &str, orbits: &[Series]) -> Result<Panel, PlotE
 
 /// Size of a panel.
 const TRACE_SIZE: (f64, f64) = (420.0, 384.0);
-/// Room right of the data.
+/// Margin right of the data.
 const TRACE_RIGHT: f64 = 14.0;
-/// Pieces of one colour.
+/// Number of pieces with a uniform colour.
 const PIECES: usize = 64;
 /// Width of a path.
 const WIDTH: f64 = 1.0;
@@ -156,7 +156,7 @@ pub fn trace_plot(trace: &Trace) -> Result<Picture, PlotError> {
     Ok(Picture { panels: vec![panel], blank: stays(|p| p.0) && stays(|p| p.1) })
 }
 
-/// Pieces of a path, which share their ends, with a colour each.
+/// Splits a path into pieces that share their ends, each with its colour.
 fn by_time(points: &[(f64, f64)]) -> impl Iterator<Item = (&[(f64, f64)], String)> {
     let last = points.len().saturating_sub(1);
     let piece = points.len().div_ceil(PIECES).max(2);

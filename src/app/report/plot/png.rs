@@ -7,7 +7,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use std::io::Write as _;
 
-/// Bytes of one stored block of a zlib stream at most.
+/// Largest number of bytes in a stored block of a zlib stream.
 const BLOCK: usize = 65_535;
 
 /// PNG of `rows` from the top, each with an index into `palette` per pixel.

@@ -1,4 +1,4 @@
-//! Drawing in SVG: colours, lengths in pixels from the upper left corner.
+//! Drawing in SVG; lengths are in pixels from the upper left corner.
 
 use super::lines::simplify;
 use crate::report::html::{base64, escape};
@@ -10,7 +10,7 @@ pub(super) const INK: &str = "#1c2330";
 pub(super) const GRID: &str = "#e3e7ee";
 /// Distance from a path, in pixels, within which points are left out.
 const TOLERANCE: f64 = 0.08;
-/// Width of a letter over the size of its font, about.
+/// Approximate width of a letter relative to its font size.
 const LETTER: f64 = 0.56;
 
 /// Position of a text.
@@ -21,7 +21,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// Width of a text in pixels, about.
+/// Approximate width of a text in pixels.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     LETTER * size * text.chars().filter(|c| !('\u{300}'..'\u{370}').contains(c)).count() as f64
 }
@@ -34,7 +34,7 @@ pub(super) fn fitting(text: &str, size: f64, width: f64) -> f64 {
 /// Size of titles, and width of their bold letters relative to plain ones.
 const TITLE: f64 = 14.0;
 const BOLD: f64 = 1.16;
-/// Size of the texts of a legend, length of its lines.
+/// Font size of a legend, and length of its lines.
 const ENTRY: (f64, f64) = (12.5, 22.0);
 
 /// Width of an entry of a legend, including the space after it.
@@ -71,7 +71,7 @@ impl Panel {
             write!(self.body, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" fill=\"{INK}\"{anchor}>{text}</text>");
     }
 
-    /// A title at the top, from a place on if it fits there.
+    /// Adds a title at the top, starting at `from` if it fits there.
     pub fn title(&mut self, from: f64, text: &str) {
         let size = fitting(text, TITLE, (self.width - 16.0) / BOLD);
         let x = from.min(self.width - 8.0 - BOLD * text_width(text, size)).max(8.0);
@@ -87,7 +87,7 @@ impl Panel {
         self.text((x + ENTRY.1 + 5.0, y + 4.0), ENTRY.0, Anchor::Start, name);
     }
 
-    /// A text that ends at a point, readable over lines.
+    /// Adds a text that ends at a point, with a halo so that it is readable over lines.
     pub fn haloed_text(&mut self, (x, y): (f64, f64), size: f64, text: &str) {
         let (x, y, size, text) = (short(x), short(y), short(size), escape(text));
         let halo = "paint-order=\"stroke\" stroke=\"#fff\" stroke-width=\"3\" stroke-linejoin=\"round\"";
@@ -97,7 +97,7 @@ impl Panel {
         );
     }
 
-    /// A text that reads from below, its middle at the point.
+    /// Adds a text that reads upwards, centred at the point.
     pub fn vertical_text(&mut self, (x, y): (f64, f64), size: f64, text: &str) {
         let (x, y, size, text) = (short(x), short(y), short(size), escape(text));
         let _ = write!(
@@ -170,7 +170,7 @@ impl Panel {
         );
     }
 
-    /// A PNG, stretched; its pixels stay squares of one colour.
+    /// Adds a stretched PNG whose pixels remain sharp squares.
     pub fn image(&mut self, png: &[u8], (x, y): (f64, f64), (width, height): (f64, f64)) {
         let _ = write!(
             self.body,
@@ -184,7 +184,7 @@ impl Panel {
         );
     }
 
-    /// Another drawing at a position; parts outside its size are cut off.
+    /// Adds another drawing at a position; parts outside its size are clipped.
     pub fn inset(&mut self, (x, y): (f64, f64), inner: &Self) {
         let (x, y, width, height) = (short(x), short(y), short(inner.width), short(inner.height));
         let _ = write!(
@@ -195,7 +195,7 @@ impl Panel {
     }
 }
 
-/// A length in at most two decimals.
+/// Formats a length with at most two decimals.
 pub(super) fn short(x: f64) -> String {
     let text = format!("{x:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -204,7 +204,7 @@ pub(super) fn short(x: f64) -> String {
 
 /// Colours that are distinguishable with any colour vision (Wong 2011), without yellow.
 pub(super) const LINES: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333"];
-/// Colour and width of a line that others are drawn over, and width of these.
+/// Colour and width of a line under others, and the width of those.
 pub(super) const UNDER: (&str, f64) = ("#93C5E8", 4.4);
 pub(super) const OVER: f64 = 1.5;
 /// Colour of highlights: the start of a path, a wrong sign.
