@@ -1,4 +1,4 @@
-//! The state of a computation in bytes: any type that serde supports, with exact numbers.
+//! Serializes the state of a computation to bytes, with exact numbers, for any type that serde supports.
 
 use crate::names::one_line;
 use crate::scalar::Scalar;
@@ -6,7 +6,7 @@ use crate::storage::container::{ContainerError, StoredPrecision};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// The bytes of a state; the same state gives the same bytes.
+/// Serializes a state; equal states give equal bytes.
 ///
 /// # Errors
 /// [`ContainerError::Header`] for types that serde cannot write.
@@ -14,7 +14,7 @@ pub fn to_bytes(state: &impl Serialize) -> Result<Vec<u8>, ContainerError> {
     postcard::to_allocvec(state).map_err(refused)
 }
 
-/// The state that [`to_bytes`] wrote; never panics and allocates no more than a small multiple of the bytes.
+/// Deserializes the output of [`to_bytes`]; never panics, and allocates no more than a small multiple of the input.
 ///
 /// # Errors
 /// [`ContainerError::Header`] for anything else, including additional bytes.
@@ -29,7 +29,7 @@ fn refused(error: postcard::Error) -> ContainerError {
     ContainerError::Header(format!("state: {}", one_line(&error.to_string())))
 }
 
-/// Numbers in the precision in which they were written.
+/// Numbers with the precision in which they were written.
 #[derive(Serialize, Deserialize)]
 enum Stored {
     F32(Vec<f32>),

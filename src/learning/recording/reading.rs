@@ -8,12 +8,12 @@ use crate::recording::units::si;
 use crate::recording::{Columns, Recording};
 use serde::{Deserialize, Serialize};
 
-/// Line of the file of every sample, run-length: from sample `.0` on, sample `k` is on line `k - .0 + .1`.
+/// Line numbers of all samples, run-length encoded: from sample `.0` on, sample `k` is on line `k - .0 + .1`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Rows(Vec<(usize, u64)>);
 
 impl Rows {
-    /// Notes that sample `sample` is on line `row`; samples come in order.
+    /// Records that sample `sample` is on line `row`; samples must arrive in order.
     pub(crate) fn note(&mut self, sample: usize, row: u64) {
         if self.0.is_empty() || self.row(sample) != row {
             self.0.push((sample, row));
@@ -50,7 +50,7 @@ pub struct Cut {
     pub after: u64,
     /// Length of the step in s.
     pub seconds: f64,
-    /// Its length in usual steps.
+    /// Length of the step in typical steps.
     pub steps: f64,
 }
 
@@ -65,7 +65,7 @@ pub struct Bridged {
     pub longest: usize,
 }
 
-/// A stretch between gaps, too short to be used.
+/// A piece between gaps that is too short to be used.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Dropped {
     /// The file.
@@ -98,7 +98,7 @@ pub struct LoadedRecording {
     pub missing: Vec<Vec<bool>>,
     /// Gaps in time.
     pub cuts: Vec<Cut>,
-    /// Stretches left out.
+    /// Pieces between gaps that were left out.
     pub dropped: Vec<Dropped>,
     /// Short gaps, across which trajectories continue.
     pub bridged: Bridged,
@@ -127,7 +127,7 @@ impl LoadedRecording {
 }
 
 impl From<Recording> for LoadedRecording {
-    /// A recording made in memory: its rows are samples, counted from 1.
+    /// Wraps a recording from memory; its rows are its samples, counted from 1.
     fn from(recording: Recording) -> Self {
         let rows = vec![Rows::default(); recording.tracks.len()];
         let takes = (0..recording.tracks.len()).collect();
@@ -154,23 +154,23 @@ impl From<Recording> for LoadedRecording {
     }
 }
 
-/// Quantity that a network learns from.
+/// The quantity that a network learns from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Targets {
-    /// Accelerations that were measured.
+    /// Measured accelerations.
     Measured,
-    /// Accelerations by local polynomials.
+    /// Accelerations from local polynomials.
     Smoothed,
-    /// Known forces, compared with the model's forces at measured accelerations, or at those by local polynomials.
+    /// Known forces, compared with the model's forces at measured or smoothed accelerations.
     Forces,
-    /// The motion itself, from the network that smoothed or measured accelerations give.
+    /// The motion itself, starting with the network that smoothed or measured accelerations give.
     Motion,
 }
 
 impl Targets {
-    /// `true` if measured accelerations are taken where there are any.
+    /// `true` if measured accelerations are used where they exist.
     pub(crate) fn takes_measured(self) -> bool {
         matches!(self, Self::Measured | Self::Forces)
     }
@@ -190,8 +190,8 @@ impl Targets {
     }
 }
 
-/// `true` if, for any coordinate, the noise of a known force exceeds the error of the acceleration expressed as a force: residuals are best
-/// taken of the noisier quantity.
+/// `true` if, for any coordinate, the noise of a known force exceeds the error of the acceleration expressed as a force: residuals should
+/// be those of the noisier quantity.
 fn forces_are_noisier(recording: &Recording, smoothing: &Smoothing) -> bool {
     let n = recording.n();
     let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));

@@ -1,9 +1,9 @@
 //! Order statistics and robust scale.
 
-/// Median of one standard normal variable's magnitude: a median magnitude over this is a standard deviation.
+/// Median magnitude of a standard normal variable, which converts a median magnitude to a standard deviation.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
-/// The number below which a fraction `f` of all values lies; `NaN` without values. Reorders.
+/// The quantile below which a fraction `f` of the values lies; `NaN` without values. Reorders the values.
 pub fn quantile(values: &mut [f64], f: f64) -> f64 {
     if values.is_empty() {
         return f64::NAN;
@@ -12,12 +12,12 @@ pub fn quantile(values: &mut [f64], f: f64) -> f64 {
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// Median; `NaN` without values. Reorders.
+/// Median; `NaN` without values. Reorders the values.
 pub fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)
 }
 
-/// Standard deviation of normal numbers of mean 0 with outliers: median magnitude over 0.6745. Reorders.
+/// Robust standard deviation of normal numbers with mean 0 and outliers: median magnitude divided by 0.6745. Reorders the values.
 pub fn robust_deviation(values: &mut [f64]) -> f64 {
     for x in values.iter_mut() {
         *x = x.abs();

@@ -5,7 +5,7 @@ use thiserror::Error;
 /// One recorded trajectory of `n` coordinates: positions at increasing times, and other measured quantities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedTrajectory {
-    /// Where it comes from, such as a file's name.
+    /// Origin of the trajectory, such as a file name.
     pub name: String,
     /// Times of the samples in s, strictly increasing, `(samples)`.
     pub times: Vec<f64>,
@@ -34,16 +34,16 @@ pub struct Recording {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TrajectoryError {
-    /// Lengths disagree.
+    /// An array has a wrong length.
     #[error("{track}: {what}: expected {}, found {found}", crate::names::pluralize(*expected, "number", "numbers"))]
     Shape {
         /// Name of the trajectory.
         track: String,
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
-        /// Numbers expected.
+        /// Expected number of values.
         expected: usize,
-        /// Numbers found.
+        /// Actual number of values.
         found: usize,
     },
     /// A number is infinite or `NaN`.
@@ -51,7 +51,7 @@ pub enum TrajectoryError {
     NotFinite {
         /// Name of the trajectory.
         track: String,
-        /// Which array.
+        /// Name of the array.
         what: &'static str,
         /// Sample, from 0.
         sample: usize,
@@ -118,7 +118,7 @@ impl RecordedTrajectory {
         }
     }
 
-    /// [`validate`](Self::validate) of a trajectory whose times may stand still: rows at the same time are repeated measurements.
+    /// Like [`validate`](Self::validate), but allows equal times: rows at the same time are repeated measurements.
     ///
     /// # Errors
     /// The first [`TrajectoryError`].
@@ -183,7 +183,7 @@ impl Recording {
 
 #[cfg(feature = "rollout")]
 impl RecordedTrajectory {
-    /// The known external forces, linear between the samples; `None` if there are none.
+    /// The known external forces, interpolated linearly between the samples; `None` if there are none.
     pub(crate) fn sampled_force(&self) -> Option<crate::rollout::SampledForce<f64>> {
         let n = self.force.len().checked_div(self.len()).filter(|n| *n > 0)?;
         crate::rollout::SampledForce::new(n, self.times.clone(), self.force.clone()).ok()

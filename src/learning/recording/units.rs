@@ -1,4 +1,4 @@
-//! Units of recorded columns, converted to SI on reading.
+//! Units of recorded columns, and their conversion to SI.
 
 use std::f64::consts::PI;
 
@@ -32,7 +32,7 @@ const UNITS: [(&str, f64); 26] = [
     ("mNm", 1e-3),
 ];
 
-/// A unit in the letters of the table: `°` is `deg`, `µm` is `um`, `N m` and `N·m` are `Nm`, `m/s²` is `m/s2`.
+/// Spells a unit as in the table: `°` becomes `deg`, `µm` becomes `um`, `N m` and `N·m` become `Nm`, `m/s²` becomes `m/s2`.
 fn spelled(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for letter in text.chars().filter(|letter| !letter.is_whitespace() && !['·', '⋅', '*'].contains(letter)) {
@@ -46,7 +46,7 @@ fn spelled(text: &str) -> String {
     plain
 }
 
-/// Factor that turns a number in this unit into SI.
+/// Factor that converts a number in this unit to SI.
 ///
 /// `text` is a unit (`deg`, `ms`, `mm`; `g` is the standard gravity), a unit per second or per second squared (`deg/s`,
 /// `mm/s2`), or the factor itself. Signs such as `°`, `µ` and `²` are understood.
@@ -70,7 +70,7 @@ pub fn factor(text: &str) -> Result<f64, String> {
     })
 }
 
-/// The SI unit of numbers in a unit once they are read; none of a bare factor.
+/// The SI unit of converted numbers; `None` for a bare factor.
 pub fn si(text: &str) -> Option<String> {
     let plain = spelled(text);
     let base = ["/s^2", "/s2", "/s"].iter().find_map(|per| plain.strip_suffix(per)).unwrap_or(&plain);

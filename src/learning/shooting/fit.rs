@@ -1,4 +1,4 @@
-//! From recorded trajectories and a first guess of the weights to a network fitted through its motion.
+//! Fits a network through its motion, from recorded trajectories and initial weights.
 
 use super::thresholds::{INTEGRATION_ERROR, MEASURED_SEGMENTS};
 use crate::configuration::{ConfigError, Penalty};
@@ -27,15 +27,15 @@ pub struct Task<'a, S> {
     pub architecture: &'a Architecture,
     /// Penalty on the mass matrix at the start of every integration step.
     pub penalty: Penalty,
-    /// Weights to begin with, of a supervised training on smoothed accelerations for instance.
+    /// Initial weights, for example those of a supervised training on smoothed accelerations.
     pub weights: Vec<S>,
     /// Trajectories to learn from.
     pub training: &'a [StateEstimate<'a>],
     /// Trajectories that choose the best epoch.
     pub validation: &'a [StateEstimate<'a>],
-    /// Noise of the measurements; without noise, the required accuracy.
+    /// Noise of the measurements; for noise-free data, the required accuracy.
     pub noise: &'a Noise,
-    /// Constraints that hold the motion.
+    /// Constraints on the motion.
     pub constraints: Option<&'a FormulaConstraints>,
     /// Seed of the order of segments.
     pub seed: u64,
@@ -44,11 +44,11 @@ pub struct Task<'a, S> {
 /// A network fitted through its motion.
 #[derive(Clone, Debug)]
 pub struct Fitted<S> {
-    /// Parameters of the best validation epoch; those given if no epoch was better.
+    /// Parameters of the best epoch; the initial ones if no epoch was better.
     pub weights: Vec<S>,
     /// One row per epoch; losses are mean squared residuals in units of noise, states are segments.
     pub history: Vec<Epoch>,
-    /// Validation loss of the parameters given.
+    /// Validation loss of the initial parameters.
     pub start_loss: f64,
     /// Best validation loss, 1 where only noise remains.
     pub validation_loss: f64,
@@ -58,8 +58,8 @@ pub struct Fitted<S> {
     pub segments: (usize, usize),
     /// Integration steps per segment.
     pub steps: usize,
-    /// Root mean square difference of predictions when steps are halved, in units of noise, at the parameters returned and the estimated
-    /// starts. Steps were chosen for the given parameters: if it is far above 0.05, use more steps.
+    /// Root mean square difference of predictions when steps are halved, in units of noise, for the fitted parameters and the estimated
+    /// starts. The number of steps was chosen for the initial parameters: if the error is far above 0.05, use more steps.
     pub integration_error: f64,
     /// Seconds spent.
     pub seconds: f64,
@@ -72,29 +72,29 @@ pub enum ShootingError {
     /// A setting is out of range.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// A trajectory contradicts itself.
+    /// A trajectory is inconsistent.
     #[error(transparent)]
     RecordedTrajectory(#[from] TrajectoryError),
-    /// The architecture contradicts itself or has another number of weights.
+    /// The architecture is inconsistent or has another number of weights.
     #[error(transparent)]
     Network(#[from] NetworkError),
     /// Estimated states or standard deviations are missing or not finite.
     #[error("{what}: expected {expected}, found {found}")]
     Estimate {
-        /// Which numbers.
+        /// Name of the numbers.
         what: String,
-        /// Values that are allowed.
+        /// Allowed values.
         expected: String,
         /// The value found.
         found: String,
     },
-    /// No two samples follow each other closely enough for a segment.
+    /// A segment needs at least two samples that are close together, and there are none.
     #[error("{what}: no trajectory has two samples that follow each other")]
     TooShort {
-        /// Training or validation trajectories.
+        /// The trajectories: training or validation.
         what: &'static str,
     },
-    /// Constraints of other coordinates than the network's.
+    /// The constraints have other coordinates than the network.
     #[error(transparent)]
     Constraints(#[from] ConstraintFormulaError),
     /// Training failed.
@@ -111,7 +111,7 @@ impl<S: Scalar> Task<'_, S> {
     fn check(&self) -> Result<(), ShootingError> {
         self.architecture.validate()?;
         let n = self.architecture.coordinates;
-        // Parameters of other terms of the motion may come after those of the network.
+        // Parameters of other terms may follow those of the network.
         let (expected, found) = (Layout::new(self.architecture).parameters, self.weights.len());
         if found < expected {
             return Err(NetworkError::Weights { expected, found }.into());
@@ -142,7 +142,7 @@ impl<S: Scalar> Task<'_, S> {
         Ok(())
     }
 
-    /// The trajectories cut into segments, if there is any.
+    /// Cuts the trajectories into segments; an error if there are none.
     fn cut(&self, which: &'static str, per_segment: usize, steps: usize) -> Result<Segments<S>, ShootingError> {
         let trajectories = if which == TRAINING { self.training } else { self.validation };
         let segments = Segments::new(self.architecture, trajectories, self.noise, per_segment, steps);
@@ -155,7 +155,7 @@ impl<S: Scalar> Task<'_, S> {
         })
     }
 
-    /// The states that the constraints allow.
+    /// The manifold of states that satisfy the constraints.
     fn manifold(&self) -> Result<Option<Arc<dyn Manifold<S>>>, ConstraintFormulaError> {
         let manifold = self.constraints.map(FormulaConstraints::manifold).transpose()?;
         Ok(manifold.map(|manifold| Arc::new(manifold) as _))
@@ -165,7 +165,7 @@ impl<S: Scalar> Task<'_, S> {
 const TRAINING: &str = "training trajectories";
 const VALIDATION: &str = "validation trajectories";
 
-/// Root mean square difference of the predictions of two cuts of the same trajectories, in units of noise.
+/// Root mean square difference between the predictions of two segmentations of the same trajectories, in units of noise.
 fn difference<S: Scalar>(
     shots: &mut ShootingObjective<S>,
     weights: &[S],
@@ -238,7 +238,7 @@ pub fn resume<S: Scalar>(
         ),
         None => (None, None),
     };
-    // Checkpoints count these epochs together with those of the training that gave the weights; the history of the fit does not.
+    // Checkpoints count these epochs together with those of the training that provided the weights; the history of the fit does not.
     let epochs_before = writer.as_ref().map_or(0, |writer| writer.outcome.history.len());
     let others = || estimate("checkpoint".to_string(), format!("{} segments", segments.0), "others");
     let mut learner = ShootingLearner::new(&problem, settings.start_share, settings.curvature_every);
@@ -282,8 +282,8 @@ pub fn resume<S: Scalar>(
 
 /// Training segments with as few steps as keep the integrator's error far below the noise, for the weights given.
 ///
-/// Tried are an eighth as many steps as a segment has samples, and from there twice as many each time, up to eight per
-/// sample. Weights that move nothing in range, or differ without bound, get one step per sample.
+/// The number of steps starts at an eighth of the number of samples and is doubled up to eight per sample. Weights that move nothing in
+/// range, or differ without bound, get one step per sample.
 fn fine_enough<S: Scalar>(
     shots: &mut ShootingObjective<S>,
     task: &Task<'_, S>,

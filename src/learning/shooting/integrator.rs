@@ -37,7 +37,7 @@ pub(super) struct SegmentIntegrator<S> {
     /// States at the starts of steps and at the end, `(steps + 1, rows, n)`.
     pub q: Vec<S>,
     pub v: Vec<S>,
-    /// Derivatives of the loss by those states; the reverse pass leaves the derivatives by the starts in the first rows.
+    /// Adjoints of those states; after the reverse pass, the first rows contain the adjoints of the starts.
     pub q_adjoint: Vec<S>,
     pub v_adjoint: Vec<S>,
     /// Segments whose motion is finite and in range so far.
@@ -73,7 +73,7 @@ impl<S: Scalar> SegmentIntegrator<S> {
         }
     }
 
-    /// Places a chunk of segments at their starts, `(rows, 2, n)`.
+    /// Initialises a chunk of segments at their starts, `(rows, 2, n)`.
     pub fn place(&mut self, segments: &Segments<S>, rows: &[u32], starts: impl Iterator<Item = S>) {
         let n = self.n;
         (self.rows, self.steps) = (rows.len(), segments.steps);
@@ -135,7 +135,7 @@ impl<S: Scalar> SegmentIntegrator<S> {
         }
     }
 
-    /// Segments that have left the range are no longer alive and stay at their starts.
+    /// Marks segments that have left the range as not alive and resets them to their starts.
     fn give_up(&mut self, segments: &Segments<S>, node: usize) {
         let (n, size) = (self.n, self.rows * self.n);
         let (reach, speed) = segments.range.split_at(n);
@@ -145,7 +145,7 @@ impl<S: Scalar> SegmentIntegrator<S> {
             let range = row * n..(row + 1) * n;
             let (q, v) = (&mut q[range.clone()], &mut v[range.clone()]);
             let (q_start, v_start) = (&q_start[range.clone()], &v_start[range]);
-            // `NaN` is in no range.
+            // A comparison with `NaN` is false.
             *alive &= (0..n).all(|i| (q[i] - q_start[i]).abs() <= reach[i] && v[i].abs() <= speed[i]);
             if !*alive {
                 q.copy_from_slice(q_start);

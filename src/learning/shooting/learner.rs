@@ -1,4 +1,4 @@
-//! Segments of motion as the data of the loop over epochs: their starts are fitted together with the weights.
+//! Segments of motion as data of the epoch loop: their starts are fitted together with the weights.
 
 use super::thresholds::{FIRST_STEPS, SEGMENTS_PER_LEFT_OUT};
 use crate::learning::state::{self, numbers};
@@ -20,7 +20,7 @@ pub(super) struct ShootingProblem<S> {
     pub validation: Segments<S>,
 }
 
-/// Segments' starts with their curvature.
+/// Starts of segments with their curvature.
 struct Starts<S> {
     at: Vec<S>,
     curvature: Curvature<S>,
@@ -36,20 +36,20 @@ impl<S: Scalar> Starts<S> {
     }
 }
 
-/// Starts of all segments, moved by Gauss and Newton's method while the weights follow their gradient.
+/// Starts of all segments, updated by Gauss-Newton steps while the weights follow their gradient.
 pub(super) struct ShootingLearner<S> {
-    /// Part of a Gauss-Newton step that a start takes per visit.
+    /// Share of a Gauss-Newton step by which a start is moved at each visit.
     share: f64,
     /// Epochs between two linearisations with respect to the starts.
     curvature_every: u64,
     starts: Starts<S>,
     start_gradient: Vec<S>,
     validation_starts: Starts<S>,
-    /// Residuals and gap of the last step.
+    /// Number of residuals, and gap, of the last step.
     last: (usize, f64),
     /// Sum of the gaps over the batches of the epoch.
     gap: f64,
-    /// Validation loss of the weights that were given.
+    /// Validation loss of the initial weights.
     pub start_loss: f64,
 }
 
@@ -81,13 +81,13 @@ impl<S: Scalar> ShootingLearner<S> {
     }
 }
 
-/// State besides the weights that changes between steps, as a checkpoint keeps it.
+/// State that changes between steps, except the weights, as stored in a checkpoint.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "S: Scalar")]
 struct ShootingState<S> {
     /// Seconds of multiple shooting.
     seconds: f64,
-    /// Validation loss of the weights it began with.
+    /// Validation loss of the initial weights.
     start_loss: f64,
     /// Sum of the gaps over the batches of the epoch.
     gap: f64,
@@ -146,7 +146,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
 
     fn follow(&mut self, problem: &mut Self::Problem) {
         let (residuals, gap) = self.last;
-        // The gradient is of a mean, the curvature of a sum.
+        // The gradient is that of a mean, but the curvature is that of a sum.
         let sum = S::of_f64(residuals as f64);
         self.start_gradient.iter_mut().for_each(|g| *g *= sum);
         self.starts.curvature.correct(&problem.training, &mut self.starts.at, &self.start_gradient, self.share);
@@ -161,7 +161,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
         record.kv.insert("gap".into(), (self.gap / batches).into());
     }
 
-    /// Uses starts that fit the weights; infinite if too many segments are left out.
+    /// Fits the starts to the weights before computing the loss; infinite if too many segments are left out.
     fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation {
         let ShootingProblem { shots, validation, .. } = problem;
         self.validation_starts.refine(shots, weights, validation);
@@ -184,7 +184,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
             matrices: matrices.to_vec(),
             jacobian: jacobian.to_vec(),
         };
-        // Numbers that no file can store are rejected with the weights, which are of the same type.
+        // Numbers that a file cannot store are also rejected in the weights, which have the same type.
         state::to_bytes(&state).ok()
     }
 }

@@ -27,7 +27,7 @@ impl<S: Scalar> Huber<S> {
         (self.bound * (two * r.abs() - self.bound), two * signed)
     }
 
-    /// The curvature that iteratively reweighted least squares ascribe to it, `rho'(r) / r`.
+    /// The curvature in iteratively reweighted least squares, `rho'(r) / r`.
     #[inline]
     pub fn curvature(&self, r: S) -> S {
         let two = <S as Real>::two();
@@ -35,11 +35,11 @@ impl<S: Scalar> Huber<S> {
     }
 }
 
-/// One residual: predicted minus observed in units of noise, with the factors that make the prediction.
+/// One residual: prediction minus observation in units of noise, with the coefficients of the prediction.
 pub(super) struct Residual<S> {
-    /// Coordinate.
+    /// Index of the coordinate.
     pub i: usize,
-    /// Step whose two ends make the prediction, and with which factors.
+    /// Step whose two ends determine the prediction, and their coefficients.
     pub step: usize,
     pub factors: [S; 4],
     /// Standard deviation.
@@ -47,7 +47,7 @@ pub(super) struct Residual<S> {
     pub value: S,
 }
 
-/// Calls `with` for every residual of row `row` of the chunk that `integrator` holds, segment `segment`.
+/// Calls `with` for every residual of segment `segment`, which is row `row` of the integrated chunk.
 pub(super) fn each_residual<S: Scalar>(
     integrator: &SegmentIntegrator<S>,
     segments: &Segments<S>,
@@ -76,7 +76,7 @@ pub(super) fn each_residual<S: Scalar>(
     }
 }
 
-/// Gap at the end of a segment in units of `tau`: its end minus the start of the next, `next` of `(2, n)`.
+/// Gap at the end of a segment in units of `tau`: its end minus the start of the next segment, `next` of shape `(2, n)`.
 pub(super) fn gap<S: Scalar>(
     integrator: &SegmentIntegrator<S>,
     segments: &Segments<S>,
@@ -93,7 +93,7 @@ pub(super) fn gap<S: Scalar>(
 /// Loss of one row of a chunk; its derivatives are added to the adjoints of the steps' states, and those by the start of the next segment
 /// are written to `next_gradient`.
 ///
-/// `weight` multiplies every residual, `continuity` every gap; the loss is summed without either, and gaps separately.
+/// `weight` multiplies every residual, `continuity` every gap; the reported sums contain neither weight, and gaps are summed separately.
 pub(super) fn add_loss<S: Scalar>(
     integrator: &mut SegmentIntegrator<S>,
     segments: &Segments<S>,

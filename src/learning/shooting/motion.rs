@@ -95,7 +95,7 @@ impl<S: Scalar> Motion<S> {
         for (right, &force) in self.right.iter_mut().zip(external) {
             *right += force;
         }
-        // Failed rows are `NaN` and handled below.
+        // Rows that fail are `NaN` and are handled below.
         if self.manifold.is_some() {
             self.held.motion(&self.right, acceleration, &mut self.workspace);
             self.held.loads(loads);
@@ -123,7 +123,7 @@ impl<S: Scalar> Motion<S> {
         let n = self.scale.len();
         let Some(good) = alive.iter().position(|alive| *alive) else { return };
         self.solution.resize(u.len(), <S as Real>::zero());
-        // Matrices that failed belong to states that are not alive.
+        // Only states that are not alive have matrices that failed.
         if self.manifold.is_some() {
             self.held.adjoint(u, &mut self.solution, &mut self.workspace);
             self.pull.clear();
@@ -145,7 +145,7 @@ impl<S: Scalar> Motion<S> {
             replaced = true;
         }
         if replaced {
-            // Zero directions on finite numbers leave the others out.
+            // Zero directions exclude the states that are not alive.
             self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Training, true);
         }
         self.dynamics.add_gradient(weights, &self.directions, gradient, Some((dq, dv)));

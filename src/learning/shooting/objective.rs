@@ -17,9 +17,9 @@ use crate::training::reduction::sum_gradients;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Segments integrated together.
+/// Number of segments that are integrated together.
 const CHUNK: usize = 8;
-/// Stripes a batch is cut into at most; each has its own gradient.
+/// Largest number of shards of a batch; each has its own gradient.
 const SHARDS: usize = 8;
 
 /// Outcome of a batch of segments.
@@ -50,7 +50,7 @@ pub struct ShootingObjective<S> {
     shards: Vec<Shard<S>>,
 }
 
-/// Segments, their starts `(segments, 2, n)`, and the weights that move them.
+/// Segments, their starts `(segments, 2, n)`, and the weights.
 struct Given<'a, S> {
     weights: &'a [S],
     segments: &'a Segments<S>,
@@ -64,10 +64,10 @@ pub(super) struct Shard<S> {
     /// Gradients by the starts of the shard's segments and of the segments that follow them, `(rows, 2, n)`.
     start_gradient: Vec<S>,
     next_gradient: Vec<S>,
-    /// Residuals, by request.
+    /// Residuals, if requested.
     values: Vec<S>,
     linear: Linearisation<S>,
-    /// Curvatures, `(rows, 2n, 2n)`, and derivatives of residuals and gaps, by request.
+    /// Curvatures, `(rows, 2n, 2n)`, and derivatives of residuals and gaps, if requested.
     curvature: Vec<S>,
     jacobian: Vec<S>,
     /// Sums over residuals and gaps.
@@ -250,7 +250,7 @@ impl<S: Scalar> ShootingObjective<S> {
         Ok(Self { model, penalty, huber, continuity, manifold: None, pool, shards: Vec::new() })
     }
 
-    /// The objective under constraints; the segments must be [under](Segments::under) them too.
+    /// Adds constraints to the objective; the segments must be [under](Segments::under) them too.
     pub fn under(self, manifold: Arc<dyn Manifold<S>>) -> Self {
         Self { manifold: Some(manifold), shards: Vec::new(), ..self }
     }
@@ -312,7 +312,7 @@ impl<S: Scalar> ShootingObjective<S> {
         };
         let (mut shards, counted) = shoot(all);
         if 0 < counted && counted < all {
-            // How many residuals count is known only now.
+            // Only now is the number of counted residuals known.
             (shards, _) = shoot(counted);
         }
         sum_gradients(&self.pool, &self.shards[..shards], |shard| &shard.gradient, gradient);
@@ -320,7 +320,7 @@ impl<S: Scalar> ShootingObjective<S> {
         self.report(shards)
     }
 
-    /// Gradients by the starts of the segments `rows` and of the segments that follow them.
+    /// Collects the gradients with respect to the starts of the segments `rows` and of the segments that follow them.
     fn gather_starts(&self, shards: usize, rows: &[u32], segments: &Segments<S>, start_gradient: &mut [S]) {
         let width = 2 * segments.n;
         start_gradient.fill(<S as Real>::zero());
@@ -340,7 +340,7 @@ impl<S: Scalar> ShootingObjective<S> {
         }
     }
 
-    /// Loss of the segments `rows`, no gradient.
+    /// Computes the loss of the segments `rows` without gradient.
     pub fn loss(&mut self, weights: &[S], segments: &Segments<S>, starts: &[S], rows: &[u32]) -> ShootingReport<S> {
         let given = Given { weights, segments, starts };
         let huber = self.huber;
@@ -417,7 +417,7 @@ impl<S: Scalar> ShootingObjective<S> {
             penalised += shard.penalised;
             left_out += shard.left_out;
         }
-        // No residual, no loss: the mean of nothing is not 0.
+        // If nothing counts, the loss is `NaN`, because the mean of nothing is not 0.
         let loss = residual.value() / count::<S>(counted);
         let gap = gap.value() / count::<S>(gaps.max(1));
         ShootingReport { loss, gap, penalty: penalty.value(), penalised, left_out, residuals: counted }

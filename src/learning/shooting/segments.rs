@@ -28,26 +28,26 @@ pub(super) struct Segment<S> {
     pub duration: f64,
     /// `true` if the next segment of the list continues where this one ends.
     pub has_next: bool,
-    /// `true` if the previous one ends where this one starts.
+    /// `true` if the previous segment ends where this one starts.
     pub has_previous: bool,
-    /// `true` if its velocities were measured.
+    /// `true` if the velocities were measured.
     pub has_velocity: bool,
-    /// Scaled origin of the next segment's positions, seen from this one's, `(n)`.
+    /// Scaled offset of the next segment's origin of positions from this segment's, `(n)`.
     pub jump: Vec<S>,
 }
 
-/// The position of a sample: its step, and the factors by which the states at the ends of the step give position and velocity.
+/// Interpolation of a sample: its step, and the coefficients of the states at both ends of the step for position and velocity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place<S> {
     pub step: usize,
-    /// Factors of `q`, `v` at the start and `q`, `v` at the end of the step in the position.
+    /// Coefficients of the position for `q`, `v` at the start and `q`, `v` at the end of the step.
     pub position: [S; 4],
-    /// Velocity counterpart of `position`.
+    /// The same coefficients for the velocity.
     pub velocity: [S; 4],
 }
 
 impl<S: Scalar> Place<S> {
-    /// `fraction` of step `step` of length `h`.
+    /// Interpolates at the relative time `fraction` of step `step`, which has length `h`.
     fn new(step: usize, fraction: f64, h: f64) -> Self {
         let [position, velocity] = hermite(fraction, h);
         Self { step, position: position.map(S::of_f64), velocity: velocity.map(S::of_f64) }
@@ -71,15 +71,15 @@ pub struct Segments<S> {
     /// Tolerances `tau` of positions and velocities, `(2, n)`: their noise; for velocities that were not measured, from the ratio of the
     /// spreads of velocities and positions.
     pub(super) tau: Vec<S>,
-    /// Bounds of the distance of positions from the start and of velocities from zero, `(2, n)`.
+    /// Largest distance of positions from the start, and largest velocity, `(2, n)`.
     pub(super) range: Vec<S>,
     /// Estimated starts, `(segments, 2, n)`.
     starts: Vec<S>,
-    /// The constraints that starts obey.
+    /// The constraints on the starts.
     pub(super) allowed: Option<StartsAllowed<S>>,
 }
 
-/// Samples of one track that one segment owns, and whether it is followed by another.
+/// Samples of one track that belong to one segment, and whether another segment follows.
 struct Piece {
     samples: Range<usize>,
     has_next: bool,
@@ -134,7 +134,7 @@ impl<S: Scalar> Segments<S> {
             starts: Vec::new(),
             allowed: None,
         };
-        // Largest excursion within a segment and speed, physical.
+        // Largest displacement within a segment and largest speed, in physical units.
         let mut largest = vec![0.0_f64; 2 * n];
         for trajectory in trajectories {
             let force = trajectory.force();
@@ -161,7 +161,7 @@ impl<S: Scalar> Segments<S> {
         all
     }
 
-    /// The segments under constraints, onto which the starts are projected.
+    /// Adds constraints to the segments and projects the starts onto them.
     pub fn under(mut self, architecture: &Architecture, manifold: Arc<dyn Manifold<S>>) -> Self {
         let allowed = StartsAllowed::new(architecture, manifold);
         self.starts.chunks_exact_mut(2 * self.n).for_each(|start| allowed.bring(start));
@@ -209,7 +209,7 @@ impl<S: Scalar> Segments<S> {
         self.starts.extend((0..n).map(|i| scaled(trajectory.v[start * n + i], i)));
         let jump = |i: usize| if has_next { scaled(origin(end, i) - origin(start, i), i) } else { <S as Real>::zero() };
         if let Some(force) = force {
-            // Zero for a track without forces if other tracks have them.
+            // A track without forces has zeros if other tracks have forces.
             let mut values = vec![0.0; n];
             for k in 0..=2 * self.steps {
                 if let Some(force) = force {
@@ -253,7 +253,7 @@ impl<S: Scalar> Segments<S> {
     pub fn starts(&self) -> &[S] {
         &self.starts
     }
-    /// Numbers of about `count` segments, evenly from the longest to the shortest.
+    /// Selects about `count` segments evenly by length, from the longest to the shortest.
     pub(super) fn cross_section(&self, count: usize) -> Vec<u32> {
         let mut rows: Vec<u32> = (0..self.len() as u32).collect();
         rows.sort_by(|&a, &b| self.list[b as usize].duration.total_cmp(&self.list[a as usize].duration));

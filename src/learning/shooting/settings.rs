@@ -7,11 +7,11 @@ use crate::optimizers::{Method, Schedule};
 use crate::training::solver::LearningRateSchedule;
 
 table! {
-    /// Choices of a fit through motion. Keys that are not given have their defaults; others are refused.
+    /// Settings of a fit through motion. Missing keys have their defaults; unknown keys are rejected.
     ///
-    /// The defaults gave the smallest errors on a double pendulum sampled at 100 Hz with noise of 1 %: segments that last about a
-    /// tenth of its slow period. Much longer ones follow its chaos rather than its law, a much larger weight of the gaps joins
-    /// them into longer ones.
+    /// The defaults gave the smallest errors on a double pendulum sampled at 100 Hz with noise of 1 %: segments that last about a tenth of
+    /// its slow period. In much longer segments chaos dominates the loss, and a much larger weight of the gaps has the same effect as
+    /// longer segments.
     pub struct Shooting {
         /// Approximate number of samples predicted from one initial condition.
         ///
@@ -58,9 +58,9 @@ table! {
 }
 
 impl Shooting {
-    /// Settings of a small network beside a known Lagrangian whose constants are learned: more epochs and larger steps,
-    /// because a constant starts farther from its final value than a weight; more weight decay, which does not act on constants; and a
-    /// larger weight of the gaps, because long segments determine constants best.
+    /// Settings for a small network in addition to a known Lagrangian whose constants are learned: more epochs and larger steps, because a
+    /// constant starts farther from its final value than a weight; more weight decay, which does not act on constants; and a larger weight
+    /// of the gaps, because long segments determine constants best.
     pub fn grey_box() -> Self {
         let (method, rate, epochs, weight_decay, continuity) = (Method::Soap, 0.01, 400, 3e-3, 1.0);
         Self { method, rate, epochs, weight_decay, continuity, ..Self::default() }
@@ -72,7 +72,7 @@ impl Shooting {
         Optimizer { method, batch, weight_decay, clip, averaging: 0.0, on_failure: OnFailure::Skip }
     }
 
-    /// Half a cosine from the rate to 0.
+    /// The learning rate falls to 0 by half a cosine.
     pub(crate) fn rates(&self) -> LearningRateSchedule {
         let &Self { epochs, rate, .. } = self;
         LearningRateSchedule { epochs, rate, eta_min: 0.0, schedule: Schedule::Cosine, t_max: 1.0 }

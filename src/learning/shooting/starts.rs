@@ -12,7 +12,7 @@ use crate::scalar::{Real, Scalar};
 use crate::shooting::loss::Huber;
 use crate::shooting::segments::Segments;
 
-/// Residuals of a chunk at its starts and at starts moved along each component.
+/// Residuals of a chunk at its starts, and at starts displaced along each component.
 #[derive(Clone, Debug)]
 pub(super) struct Linearisation<S> {
     pub base: Vec<S>,
@@ -28,7 +28,7 @@ impl<S> Default for Linearisation<S> {
 }
 
 impl<S: Scalar> Linearisation<S> {
-    /// Step of component `k`.
+    /// Finite-difference step of component `k`.
     pub fn difference(&self, segments: &Segments<S>, k: usize) -> S {
         S::epsilon().sqrt() * S::of_f64(START_DIFFERENCE) * segments.range[k]
     }
@@ -57,7 +57,7 @@ impl<S: Scalar> Linearisation<S> {
             let (h, g) = (&mut curvature[h..], &mut gradient[g..]);
             for k in 0..width {
                 let square = (segments.tau[k] * segments.tau[k]).recip();
-                // The gap before this start.
+                // The gap before this start also depends on it.
                 let before = if segment.has_previous { two * continuity } else { zero };
                 h[k * width + k] = square * (S::of_f64(START_DAMPING) + before);
             }
@@ -88,12 +88,12 @@ impl<S: Scalar> Linearisation<S> {
     }
 }
 
-/// Derivatives of all residuals and gaps by their starts, and the resulting curvature of the loss.
+/// Derivatives of all residuals and gaps with respect to the starts, and the resulting curvature of the loss.
 #[derive(Debug)]
 pub struct Curvature<S> {
     /// `(segments, 2n, 2n)`.
     matrices: Vec<S>,
-    /// `(residuals and gap of each segment, 2n)`, and where each segment's begin.
+    /// Derivatives `(residuals and gap of each segment, 2n)`, and the index at which each segment begins.
     jacobian: Vec<S>,
     offsets: Vec<usize>,
     correction: Vec<S>,
@@ -113,7 +113,7 @@ impl<S: Scalar> Default for Curvature<S> {
 }
 
 impl<S: Scalar> Curvature<S> {
-    /// Takes over the parts of all segments in order.
+    /// Collects the parts of all segments in order.
     pub(super) fn set<'a>(&mut self, segments: &Segments<S>, parts: impl Iterator<Item = (&'a [S], &'a [S])>) {
         self.matrices.clear();
         self.jacobian.clear();
@@ -130,8 +130,8 @@ impl<S: Scalar> Curvature<S> {
         }
     }
 
-    /// Curvature, `(segments, 2n, 2n)`, and derivatives, `(residuals and gap of each segment, 2n)`: the arguments of
-    /// [`restore`](Self::restore).
+    /// Returns the curvature, `(segments, 2n, 2n)`, and the derivatives, `(residuals and gap of each segment, 2n)`, as
+    /// [`restore`](Self::restore) takes them.
     pub(super) fn stored(&self) -> (&[S], &[S]) {
         (&self.matrices, &self.jacobian)
     }
@@ -168,7 +168,7 @@ impl<S: Scalar> Curvature<S> {
 
     /// Moves `starts` by `-share H^-1 gradient`, both `(segments, 2, n)`; the gradient is of sums, not of means.
     ///
-    /// A correction of more than a tenth of the largest excursion within a segment is cut.
+    /// A correction is limited to a tenth of the largest displacement within a segment.
     pub fn correct(&mut self, segments: &Segments<S>, starts: &mut [S], gradient: &[S], share: f64) {
         let width = 2 * segments.n;
         let zero = <S as Real>::zero();
@@ -179,7 +179,7 @@ impl<S: Scalar> Curvature<S> {
             if g.iter().all(|g| *g == zero) {
                 continue;
             }
-            // An initial state whose curvature carries no information stays.
+            // A start is not moved if its curvature contains no information.
             let step = match &segments.allowed {
                 Some(allowed) => allowed.step(start, h, g, &mut self.workspace),
                 None => {

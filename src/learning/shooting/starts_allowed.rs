@@ -1,4 +1,4 @@
-//! Starts under constraints: the states that are allowed, and the steps that satisfy the constraints.
+//! Starts under constraints: projection onto the constraints, and steps along them.
 
 use crate::lagrangian::{Bordered, Manifold, ManifoldRows, project};
 use crate::linalg::Workspace;
@@ -7,7 +7,7 @@ use crate::scalar::{Real, Scalar};
 use std::fmt;
 use std::sync::Arc;
 
-/// The states `phi(q) = 0`, `A v = b` that constraints allow, in scaled coordinates.
+/// The states that satisfy the constraints, `phi(q) = 0` and `A v = b`, in scaled coordinates.
 #[derive(Clone)]
 pub(super) struct StartsAllowed<S> {
     manifold: Arc<dyn Manifold<S>>,
@@ -29,7 +29,7 @@ impl<S: Scalar> StartsAllowed<S> {
         start.iter().zip(self.scale.iter().cycle()).map(|(&x, &s)| x * s).collect()
     }
 
-    /// Projects a start, `(2, n)`, onto the constraints; if that fails, the start stays.
+    /// Projects a start, `(2, n)`, onto the constraints; if that fails, the start is unchanged.
     pub fn bring(&self, start: &mut [S]) {
         let n = self.scale.len();
         let mut state = self.physical(start);

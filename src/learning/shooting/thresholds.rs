@@ -1,21 +1,21 @@
-//! Every number that limits or sets multiple shooting.
+//! Numerical settings and limits of multiple shooting.
 
 // ---- Accuracy ----
 
 /// Largest root mean square error of the integrator, in units of noise.
 pub(super) const INTEGRATION_ERROR: f64 = 0.05;
-/// Segments on which it is measured.
+/// Number of segments on which this error is measured.
 pub(super) const MEASURED_SEGMENTS: usize = 64;
 /// Largest number of samples of a segment, and of its integration steps.
 pub(super) const MOST_STEPS: usize = 1 << 16;
 
 // ---- Segments that are left out ----
 
-/// Factor by which a state may leave the range of the data before its segment is left out.
+/// Multiple of the data's range that a state may reach before its segment is left out.
 pub(super) const STATE_RANGE: f64 = 10.0;
-/// The same in units of the noise, where nothing moves.
+/// The same limit in units of the noise, if nothing moves.
 pub(super) const NOISE_RANGE: f64 = 100.0 * STATE_RANGE;
-/// At most one in this many validation segments may be left out of a loss that counts.
+/// A loss counts only if at most one in this many validation segments is left out.
 pub(super) const SEGMENTS_PER_LEFT_OUT: usize = 20;
 
 // ---- Corrections of the starts ----

@@ -35,7 +35,7 @@ pub struct Selection {
     pub number: Option<String>,
 }
 
-/// The columns of a file, and which of them are wanted.
+/// The columns of a file, from which the used ones are selected.
 struct File<'a> {
     columns: &'a Columns,
     /// `None` in a file without names.
@@ -75,7 +75,7 @@ impl Selection {
         self.values.first().filter(|_| self.timed).map(|used| used.name.as_str())
     }
 
-    /// The columns by the names used in this file.
+    /// The description of the columns with the names used in this file.
     pub fn called(&self, columns: &Columns) -> Columns {
         let mut called = columns.clone();
         if columns.wide {
@@ -103,7 +103,7 @@ impl Selection {
 }
 
 impl File<'_> {
-    /// The used columns; for trajectories side by side, the columns with this number after their names.
+    /// Selects the used columns; for trajectories side by side, those whose names end in this number.
     fn select(&self, number: Option<String>) -> Result<Selection, Problem> {
         let columns = self.columns;
         let mut faults = Faults::default();
@@ -201,7 +201,7 @@ impl File<'_> {
         self.unit(asked, used).is_some()
     }
 
-    /// Where a column is, by its name or its number.
+    /// Index of a column, given its name or its number.
     fn position(&self, what: &'static str, name: &str) -> Result<usize, Problem> {
         let (row, width) = (self.row, self.width);
         let named = self.headings.as_deref().unwrap_or(&[]);

@@ -1,4 +1,4 @@
-//! All columns of a file, whatever they mean.
+//! Reads all columns of a file, whatever their meaning.
 
 use super::thresholds::{LARGEST_FILE, MOST_SEPARATE_COLUMNS};
 use super::{Problem, parse};
@@ -45,7 +45,7 @@ impl RawTable {
             Err(problem) => return Err(problem),
             Ok(_) => Vec::new(),
         };
-        // No header is a row of numbers.
+        // A row of numbers is not a header.
         let has_names = names.iter().any(|name| name.parse::<f64>().is_err());
         let twice = names.iter().enumerate().any(|(k, name)| names[..k].contains(name));
         let names = if twice { (1..=names.len()).map(|k| k.to_string()).collect() } else { names };
@@ -77,7 +77,7 @@ fn rows(path: &Path, columns: &Columns) -> Result<Vec<f64>, Problem> {
     Ok(tracks.flat_map(|track| track.track.q).collect())
 }
 
-/// Rows as columns.
+/// Transposes rows to columns.
 fn columns(rows: &[f64], width: usize) -> Vec<Vec<f64>> {
     (0..width).map(|k| rows.iter().skip(k).step_by(width).copied().collect()).collect()
 }

@@ -1,4 +1,4 @@
-//! Lines of text cut into fields.
+//! Splits lines of text into fields.
 
 use serde::Serialize;
 
@@ -19,8 +19,8 @@ pub enum Separator {
 }
 
 impl Separator {
-    /// The separator of a line: the first of `;`, `,`, tab and `|` that stands outside of double quotes, or blanks between words. A comma
-    /// is not the separator if another separator divides the line differently, or if blanks separate numbers with decimal commas.
+    /// The separator of a line: the first of `;`, `,`, tab and `|` outside double quotes, or blanks between words. A comma is not the
+    /// separator if another separator divides the line differently, or if blanks separate numbers with decimal commas.
     pub fn of(line: &str) -> Self {
         let outside: String =
             line.split('"').enumerate().map(|(k, part)| if k % 2 == 0 { part } else { "q" }).collect();
@@ -63,7 +63,7 @@ impl Separator {
     }
 }
 
-/// `0,5`: a number with a comma between two digits.
+/// `true` for a number with a decimal comma between two digits, such as `0,5`.
 fn is_decimal_comma(word: &str) -> bool {
     let digit = |letter: Option<char>| letter.is_some_and(|letter| letter.is_ascii_digit());
     let parts = word.split_once(',');
@@ -71,7 +71,7 @@ fn is_decimal_comma(word: &str) -> bool {
         && with_point(word).is_some()
 }
 
-/// The number of a text with a decimal comma and no point.
+/// Replaces a decimal comma by a point and parses the number; `None` if the text has no comma or also a point.
 pub(crate) fn with_point(text: &str) -> Option<f64> {
     let mut plain = [0; 64];
     let plain = plain.get_mut(..text.len())?;

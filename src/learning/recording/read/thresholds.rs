@@ -4,8 +4,8 @@
 
 /// Fewest samples of a trajectory.
 pub(crate) const LEAST_SAMPLES: usize = 16;
-/// Difference in rad, from which neither is used, of the turns that the velocities before and after a gap predict across it: about a
-/// quarter of a turn.
+/// Largest difference, in rad, between the turns that the velocities before and after a gap predict: about a quarter of a turn. Above it,
+/// the number of turns is ambiguous.
 pub(super) const AMBIGUOUS_TURN: f64 = 1.5;
 /// Most trajectories of one file.
 pub(super) const MOST_TRAJECTORIES: usize = 100_000;
@@ -17,7 +17,7 @@ pub(super) const LARGEST_FILE: u64 = 1 << 36;
 /// Largest ratio of unpacked to packed bytes. Measured numbers shrink to a tenth at most; data that shrinks to a hundredth contains hardly
 /// any number.
 pub(super) const MOST_EXPANSION: u64 = 100;
-/// Unpacked bytes that are allowed whatever the ratio.
+/// Unpacked size in bytes that is allowed regardless of the ratio.
 pub(super) const UNPACKED_ANYWAY: u64 = 1 << 26;
 /// Longest line of a text in bytes.
 pub(super) const LONGEST_LINE: u64 = 1 << 20;

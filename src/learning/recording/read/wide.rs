@@ -5,18 +5,18 @@ use super::builder::Builder;
 use super::error::Faults;
 use super::number::Numbers;
 
-/// One of the trajectories, or all if they are not side by side.
+/// One of the trajectories side by side, or all trajectories of a file that has none side by side.
 pub struct Lane<'a> {
-    /// What it has become.
+    /// Builds the trajectory.
     pub builder: Builder<'a>,
     /// Used numbers of the current row.
     pub values: Vec<f64>,
-    /// First row after its beginning without numbers.
+    /// First row without numbers after the start of the trajectory.
     empty: Option<u64>,
 }
 
 impl<'a> Lane<'a> {
-    /// No rows yet.
+    /// Creates a lane without rows.
     pub fn new(builder: Builder<'a>) -> Self {
         let values = vec![0.0; builder.selection().values.len()];
         Self { builder, values, empty: None }

@@ -8,7 +8,7 @@ use super::xml::{Tag, damaged, next};
 use std::io::BufReader;
 use zip::ZipArchive;
 
-/// The entry that makes an archive a workbook.
+/// The entry that identifies a workbook.
 pub const MARK: &str = "xl/workbook.xml";
 
 /// The cells of the first sheet, separated by tabs, every row on the line of its number.
@@ -61,7 +61,7 @@ fn each_tag(
 struct SharedStrings {
     all: Vec<String>,
     current: String,
-    /// Inside of a text's pronunciation.
+    /// `true` inside a phonetic guide, which is not part of the text.
     aside: bool,
 }
 
@@ -76,14 +76,14 @@ impl SharedStrings {
     }
 }
 
-/// Rows of a sheet while its tags come in.
+/// Rows of a sheet, built tag by tag.
 #[derive(Default)]
 struct Cells {
     texts: Vec<String>,
     lines: String,
     /// Number of the row, from 1.
     row: usize,
-    /// Fields of the first row that has any.
+    /// Number of fields in the first row that is not empty.
     width: usize,
     fields: Vec<String>,
     /// Bytes of the fields so far.

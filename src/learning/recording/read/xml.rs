@@ -1,4 +1,4 @@
-//! The little of XML that a workbook needs: tags, their attributes, and the text before them.
+//! A minimal XML parser for workbooks: tags, their attributes, and the text before them.
 
 use super::Problem;
 use super::thresholds::LONGEST_TAG;
@@ -11,9 +11,9 @@ pub struct Tag {
     pub text: String,
     /// Its name, without a prefix.
     pub name: String,
-    /// `true` for the end of an element, which `<name/>` is too.
+    /// `true` if the tag ends an element, like `</name>` and `<name/>`.
     pub end: bool,
-    /// `true` for the beginning of one.
+    /// `true` if the tag begins an element.
     pub start: bool,
     attributes: String,
 }

@@ -23,7 +23,7 @@ use signal::{Fits, Signal};
 use thiserror::Error;
 use window::best;
 
-/// Settings of derivatives; settings that are not given are chosen from the data.
+/// Settings of smoothing; settings that are not given are chosen from the data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothOptions {
     /// Degree of the polynomials, 2 to 8.
@@ -47,27 +47,27 @@ impl Default for SmoothOptions {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SmoothError {
-    /// An option out of its range.
+    /// An option is out of range.
     #[error("{what}: expected {expected}, found {found}")]
     Option {
-        /// Which option.
+        /// Name of the option.
         what: &'static str,
         /// Its range.
         expected: String,
         /// Value that was given.
         found: String,
     },
-    /// A trajectory too short for the window.
+    /// A trajectory is too short for the window.
     #[error("{track}: {} fewer than the {needed} that a fit of this degree needs", pluralize(*samples, "sample is", "samples are"))]
     Short {
         /// The trajectory; empty for all of them.
         track: String,
         /// Its samples.
         samples: usize,
-        /// Least number.
+        /// Smallest number of samples.
         needed: usize,
     },
-    /// A trajectory of another number of coordinates, or without the velocities that the others have.
+    /// A trajectory has another number of coordinates, or lacks the velocities that the others have.
     #[error("{track}: expected positions and velocities of {n} coordinates")]
     Shape {
         /// The trajectory.
@@ -82,7 +82,7 @@ pub enum SmoothError {
 pub struct Chosen {
     /// Noise of its positions.
     pub noise: Noise,
-    /// Noise of its velocities, if they take part.
+    /// Noise of its velocities, if they are used.
     pub velocity_noise: Option<Noise>,
     /// The window and the quality of its derivatives.
     pub quality: Quality,
@@ -172,7 +172,7 @@ impl Smoothed {
         before.min(end)..end
     }
 
-    /// `true` for a sample with a full window without too long a gap.
+    /// `true` if the window of the sample is complete and has no long gap.
     pub fn is_full(&self, sample: usize) -> bool {
         self.interior().contains(&sample) && self.lacking.binary_search(&sample).is_err()
     }
@@ -225,7 +225,7 @@ impl Smoothing {
         Ok(Self { degree: options.degree, coordinates, own, step, varying: options.window.is_none(), more: 0 })
     }
 
-    /// The same windows with polynomials of two more degrees: more noise and hardly any bias, for results that are averaged afterwards.
+    /// Copies the smoothing with polynomials of two more degrees: more noise and hardly any bias, for results that are averaged later.
     pub(crate) fn sharper(&self) -> Self {
         Self { more: self.more + 2, ..self.clone() }
     }
@@ -252,18 +252,18 @@ impl Smoothing {
         signal.visit(window, |found, _, track, at| visit(found.values, &recording.tracks[track], at));
     }
 
-    /// Expected error of the accelerations over their size, of the worst coordinate.
+    /// Ratio of the expected error of the accelerations to their size, for the worst coordinate.
     pub(crate) fn acceleration_error(&self) -> f64 {
         self.coordinates.iter().map(|chosen| chosen.quality.relative()).fold(0.0, f64::max)
     }
 
-    /// Longest window in samples of a trajectory with the usual step.
+    /// Longest window in samples of a trajectory with typical steps.
     pub(crate) fn window(&self) -> usize {
         self.coordinates.iter().map(|chosen| chosen.quality.window).max().unwrap_or(0)
     }
 
-    /// Samples between two parts of a trajectory such that no window reaches from one to the other, and samples that each part needs: a
-    /// full window and one more, or enough for a polynomial if nothing has to be derived.
+    /// Gap in samples between two parts of a trajectory such that no window overlaps both, and the number of samples that each part needs:
+    /// a full window and one more, or enough for a polynomial if nothing is differentiated.
     pub(crate) fn apart(&self, recording: &Recording) -> (usize, usize) {
         let window = self.window();
         let derived = !(recording.has_velocities() && recording.has_accelerations());
@@ -332,12 +332,12 @@ fn ratio(position: Noise, velocity: Noise, step: f64) -> Option<f64> {
     ratio.is_finite().then_some(ratio)
 }
 
-/// Fills column `signal.i` of all arrays by a window of its own around every sample.
+/// Fills column `signal.i` of all arrays; every sample has its own window.
 fn smooth(Typical { signal, sigmas, .. }: &Typical<'_>, windows: &[usize], smoothed: &mut Smoothed) {
     let (times, clock, n, i) = (&signal.tracks[0].times, &signal.clocks[0], signal.n, signal.i);
     let length = times.len();
     let mut fits = Fits::default();
-    // Squared change by two more degrees without the part of it that noise explains, in units of the noise.
+    // Squared change by two more degrees, minus the variance of its noise, in units of the noise.
     let mut excess: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; length]);
     let full: Vec<bool> = (0..length).map(|at| clock.surrounds(times, at, windows[at]) == [true; 2]).collect();
     for (at, &window) in windows.iter().enumerate() {
@@ -360,8 +360,8 @@ fn smooth(Typical { signal, sigmas, .. }: &Typical<'_>, windows: &[usize], smoot
                 (changes[k] / sigmas[at]).powi(2) / fit.variance[k] - fit.change_variance[k] / fit.variance[k];
         }
     }
-    // A single change indicates the bias only roughly, so its square is averaged over a window to either side. One-sided windows are not
-    // averaged with full ones.
+    // A single change is a rough estimate of the bias, so its square is averaged over a window on either side. One-sided windows are
+    // averaged separately from full ones.
     for (excess, [_, error, bias]) in excess.iter().zip(smoothed.arrays()) {
         let counted = |at: &usize| full[*at];
         for (at, window) in windows.iter().enumerate() {

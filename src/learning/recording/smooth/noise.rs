@@ -1,4 +1,4 @@
-//! Noise of a measured signal from the signal alone.
+//! Estimates the noise of a measured signal from the signal alone.
 
 use super::thresholds::{
     CONTRAST_ORDERS, LEAST_LOCAL_NOISE, LOCAL_CONTRASTS, MOST_CONTRASTS, ORDER_AGREEMENT, OUTLYING_CONTRAST,
@@ -12,7 +12,7 @@ use serde::Serialize;
 pub struct Noise {
     /// Standard deviation, in the unit of the signal.
     pub sigma: f64,
-    /// Order of the differences that gave it.
+    /// Order of the differences that determined it.
     pub order: usize,
     /// `true` if higher differences agree. If not, the motion is sampled too coarsely to be distinguished from noise, and `sigma`
     /// is an upper bound.
@@ -57,7 +57,7 @@ pub fn noise<'a>(signals: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone, 
     let least = found.iter().map(|(_, sigma, _)| *sigma).fold(f64::INFINITY, f64::min);
     match found.iter().find(|(_, sigma, scatter)| *sigma <= least * (1.0 + ORDER_AGREEMENT * scatter)) {
         Some(&(order, sigma, _)) => {
-            // Still falling at the last order: what remains may be motion.
+            // If the estimate still decreases at the last order, it may contain motion.
             let resolved = match found.as_slice() {
                 [.., (_, before, _), (_, last, _)] => {
                     order < found[found.len() - 1].0 || *last > STILL_FALLING * before
@@ -70,7 +70,8 @@ pub fn noise<'a>(signals: impl Iterator<Item = (&'a [f64], &'a [f64])> + Clone, 
     }
 }
 
-/// Noise at every sample of column `i` of a trajectory: from the nearby contrasts if these clearly differ from the noise of the recording.
+/// Noise at every sample of column `i` of a trajectory: estimated from nearby contrasts if these clearly differ from the noise of the
+/// recording.
 ///
 /// Contrasts beyond four standard deviations count as four: a bad sample is not noise.
 pub(super) fn along((times, x): (&[f64], &[f64]), regular: bool, (n, i): (usize, usize), noise: Noise) -> Vec<f64> {
@@ -80,7 +81,7 @@ pub(super) fn along((times, x): (&[f64], &[f64]), regular: bool, (n, i): (usize,
         return vec![sigma; times.len()];
     }
     let mut weights = [0.0; CONTRAST_ORDERS[CONTRAST_ORDERS.len() - 1] + 1];
-    // Sums of squares up to each contrast, in units of the noise of the recording.
+    // Cumulative sums of squares of the contrasts, in units of the noise of the recording.
     let mut sums = vec![0.0; count + 1];
     for start in 0..count {
         if !(regular && start > 0) {

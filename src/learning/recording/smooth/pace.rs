@@ -6,28 +6,28 @@ use super::thresholds::{
 use crate::recording::smooth::signal::{Fits, Signal};
 use crate::recording::smooth::window::BiasBound;
 
-/// A coordinate of one trajectory with its usual window in samples.
+/// A coordinate of one trajectory with its typical window in samples.
 pub struct Typical<'a> {
     /// The coordinate on this trajectory, the only one of the signal.
     pub signal: Signal<'a>,
     /// Noise at every sample.
     pub sigmas: Vec<f64>,
-    /// Length of the usual window in samples.
+    /// Length of the typical window in samples.
     pub window: usize,
     /// Root mean square error of its accelerations, the unit in which coordinates are compared.
     pub error: f64,
 }
 
-/// Window `2^(k/3)` times the usual one, odd.
+/// Window of `2^(k/3)` times the typical length, rounded to an odd number.
 fn scaled(window: usize, k: f64) -> usize {
     ((window as f64 * (k / 3.0).exp2()).round() as usize) | 1
 }
 
-/// Errors of the accelerations for one length of the window, at places along the trajectory.
+/// Errors of the accelerations for one window length, at places along the trajectory.
 struct TriedWindow {
     first: usize,
     stride: usize,
-    /// Variance, squared bias and the variance of its estimate's change.
+    /// Variance, squared bias, and variance of the estimated change, at every place.
     squares: Vec<[f64; 3]>,
 }
 
@@ -49,7 +49,7 @@ impl TriedWindow {
             excess.push(change * change - noise * fit.change_variance[2]);
             variance.push([fit.variance[2], fit.change_variance[2]].map(|variance| noise * variance));
         }
-        // The change of one place is a single number: it is averaged over a window to either side.
+        // The change at one place is a single number, so it is averaged over a window on either side.
         let near = window / stride;
         let squares = (0..excess.len()).map(|k| {
             let part = &excess[k.saturating_sub(near)..(k + near + 1).min(excess.len())];
@@ -59,7 +59,7 @@ impl TriedWindow {
         Some(Self { first: half, stride, squares: squares.collect() })
     }
 
-    /// Variance, squared bias and the variance of its estimate's change at the nearest place.
+    /// Variance, squared bias, and variance of the estimated change, at the nearest place.
     fn at(&self, sample: usize) -> [f64; 3] {
         let place = sample.saturating_sub(self.first) / self.stride;
         self.squares[place.min(self.squares.len() - 1)]
@@ -94,7 +94,7 @@ pub fn windows(usual: &[Typical<'_>]) -> Vec<Vec<usize>> {
             let place = sample / grid;
             let reach = of(first, f64::from(chosen[place])) / (4 * grid);
             let near = &chosen[place.saturating_sub(reach)..(place + reach + 1).min(chosen.len())];
-            // In half steps, so that few different windows are computed.
+            // Rounded to half steps, so that only a few different windows are computed.
             (2.0 * near.iter().map(|&k| f64::from(k)).sum::<f64>() / near.len() as f64).round() as i32
         })
         .collect();

@@ -16,11 +16,11 @@ pub struct Signal<'a> {
     pub clocks: &'a [Clock],
     /// Number of coordinates.
     pub n: usize,
-    /// Which one.
+    /// Index of the coordinate.
     pub i: usize,
     /// Noise of its positions.
     pub sigma: f64,
-    /// Noise of positions over noise of velocities, in s, if velocities take part.
+    /// Noise of positions over noise of velocities, in s, if velocities are used.
     pub ratio: Option<f64>,
     /// Degree of the polynomials.
     pub degree: usize,
@@ -34,9 +34,9 @@ pub struct Fits {
 }
 
 impl Signal<'_> {
-    /// Samples of a window of `window` usual steps around sample `at` of a trajectory, see [`Clock::window`].
+    /// Samples of a window of `window` typical steps around sample `at` of a trajectory, see [`Clock::window`].
     pub fn window(&self, track: usize, at: usize, window: usize) -> Range<usize> {
-        // Two more degrees must have as many samples as coefficients.
+        // The window needs enough samples for two more degrees.
         self.clocks[track].window(&self.tracks[track].times, at, window, self.degree + 3)
     }
 

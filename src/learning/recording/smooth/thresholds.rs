@@ -13,15 +13,15 @@ pub(super) const MOST_GAP_STRETCH: f64 = 1.5;
 
 // ---- Noise ----
 
-/// Orders of differences that are tried.
+/// Orders of the differences that are tried.
 pub(super) const CONTRAST_ORDERS: [usize; 5] = [2, 4, 6, 8, 10];
 /// Contrasts, in standard deviations, beyond which they do not count as noise: one in 16,000 of normal noise.
 pub(super) const OUTLYING_CONTRAST: f64 = 4.0;
 /// Standard errors within which the results of two orders agree.
 pub(super) const ORDER_AGREEMENT: f64 = 2.0;
-/// Ratio of the result of the last order to that of the one before, up to which the estimate still falls and may contain motion.
+/// Ratio of the results of the last two orders below which the estimate is still decreasing, so that it may contain motion.
 pub(super) const STILL_FALLING: f64 = 0.8;
-/// Noise over the rounding of the largest number up to which it is rounding, not motion.
+/// Noise, in units of the rounding of the largest number, up to which it counts as rounding instead of motion.
 pub(super) const ROUNDING_NOISE: f64 = 16.0;
 /// Ratio of the noise at a sample to that of the recording, or its inverse, up to which they count as equal. The local estimate comes from
 /// 2 [`LOCAL_CONTRASTS`] correlated contrasts, so that its error is 10 to 20 %.
@@ -42,9 +42,9 @@ pub(super) const BIAS_SIGNIFICANCE: f64 = 3.0;
 /// Largest squared error of the typical window, over the smallest, at which a trajectory or a sample keeps it: an error larger by a factor
 /// of 1.4.
 pub(super) const KEPT_SQUARED_ERROR: f64 = 2.0;
-/// Squared error over the smallest that is clearly a rise.
+/// Squared error, relative to the smallest, that counts as a clear rise.
 pub(super) const RISEN_SQUARED_ERROR: f64 = 1.5;
-/// Squared error over the smallest from which longer windows are no longer tried: twice the error.
+/// Squared error, relative to the smallest, above which longer windows are not tried: twice the error.
 pub(super) const HOPELESS_SQUARED_ERROR: f64 = 4.0;
 /// Smallest share of the samples on trajectories that are long enough for a window.
 pub(super) const LEAST_COVERED: f64 = 0.5;

@@ -1,4 +1,4 @@
-//! Length of the window: long against noise, short against bias.
+//! Chooses the length of the window: long windows reduce noise, short ones reduce bias.
 
 use super::thresholds::{
     BIAS_SIGNIFICANCE, HOPELESS_SQUARED_ERROR, KEPT_SQUARED_ERROR, LEAST_COVERED, LONGEST_WINDOW, RISEN_SQUARED_ERROR,
@@ -7,8 +7,8 @@ use crate::recording::RecordedTrajectory;
 use crate::recording::smooth::signal::Signal;
 use serde::Serialize;
 
-/// The significant part of an estimated squared bias: `square` is the mean, over `independent` samples, of the square of a number less its
-/// noise variance.
+/// The significant part of an estimated squared bias; 0 if it is consistent with noise. `square` is the mean of the squared change minus
+/// its noise variance, over `independent` samples.
 fn significant(square: f64, variance: f64, independent: f64) -> f64 {
     (square - BIAS_SIGNIFICANCE * variance * (2.0 / independent.max(1.0)).sqrt()).max(0.0)
 }
@@ -23,11 +23,11 @@ pub struct Quality {
     /// Their root mean square bias, from motion that the polynomial cannot follow. It is estimated with two more degrees, which also miss
     /// part of short bursts and make it too small there, for a chaotic double pendulum by a third.
     pub bias: [f64; 3],
-    /// Root mean square of velocity, error taken out.
+    /// Root mean square velocity, corrected for its error.
     pub velocity: f64,
     /// Root mean square velocity about its mean: for a drift with oscillations, the velocity of the oscillations.
     pub velocity_deviation: f64,
-    /// Root mean square of acceleration, error taken out.
+    /// Root mean square acceleration, corrected for its error.
     pub acceleration: f64,
 }
 
@@ -48,8 +48,8 @@ impl Quality {
 ///
 /// The bias of a window is estimated by the change that two more degrees make. Over several periods of the motion polynomials of either
 /// degree miss everything, and their change says nothing; but a window misses no less than a shorter one within it. Until then bias grows
-/// from window to window. A supposed bias that falls with the error itself, before that has clearly risen, was correlated noise, such as an
-/// encoder's marks.
+/// from window to window. An apparent bias that decreases together with the error, before the error has clearly risen, was correlated
+/// noise, such as an encoder's marks.
 #[derive(Clone, Copy, Debug)]
 pub struct BiasBound {
     square: f64,
@@ -64,7 +64,8 @@ impl Default for BiasBound {
 }
 
 impl BiasBound {
-    /// Squared bias of the next longer window, whose variance and squared bias by the change are `error`, see [`significant`].
+    /// Squared bias of the next longer window. `error` contains its variance and the squared bias that the change indicates; see
+    /// [`significant`].
     pub fn bias(&mut self, error: [f64; 2], variance: f64, independent: f64) -> f64 {
         let [own, square] = error;
         self.risen |= own + square > RISEN_SQUARED_ERROR * self.least;
@@ -75,23 +76,23 @@ impl BiasBound {
         square.max(self.square)
     }
 
-    /// `true` if this squared error shows that the bias so far was noise.
+    /// `true` if this squared error shows that the earlier bias was only noise.
     fn falls(&self, error: f64) -> bool {
         !self.risen && error <= self.least
     }
 
-    /// This window and all longer ones have at least this squared bias.
+    /// Raises the lower bound of the squared bias for this window and all longer ones.
     fn raise(&mut self, square: f64) {
         self.square = self.square.max(square);
     }
 }
 
-/// Accelerations of one trajectory by one window.
+/// Accelerations of one trajectory for one window.
 #[derive(Clone, Debug, Default)]
 struct Accelerations {
     /// Samples, ascending, and the accelerations there.
     values: Vec<(usize, f64)>,
-    /// Their mean variance by noise.
+    /// Mean variance due to noise.
     variance: f64,
     /// Number of independent errors.
     independent: f64,
@@ -116,16 +117,16 @@ impl Accelerations {
     }
 }
 
-/// Errors of the accelerations on one trajectory, by window.
+/// Errors of the accelerations of one trajectory, by window.
 #[derive(Clone, Debug, Default)]
 struct WindowErrors {
     /// Squared errors, bias and variance together, of the windows in order, up to the longest that fits the trajectory.
     squares: Vec<f64>,
-    /// The significant part of each.
+    /// The significant squared bias of each window.
     significant: Vec<f64>,
-    /// Number of the window with the least error, before the error clearly rises again.
+    /// Index of the window with the smallest error, before the error clearly rises again.
     best: usize,
-    /// The accelerations by it.
+    /// The accelerations for that window.
     finest: Accelerations,
     past: bool,
     bound: BiasBound,
@@ -148,12 +149,12 @@ impl WindowErrors {
         }
     }
 
-    /// Squared error of window number `k`; for one too long for the trajectory, that of the longest.
+    /// Squared error of window number `k`; if that is too long for the trajectory, the error of the longest one.
     fn at(&self, k: usize) -> Option<f64> {
         self.squares.get(k).or(self.squares.last()).copied()
     }
 
-    /// Number of its own window, given the typical one.
+    /// Index of the trajectory's own window, given the typical one.
     fn own(&self, usual: usize) -> usize {
         match (self.squares.get(self.best), self.significant.get(usual).or(self.significant.last())) {
             (Some(least), Some(kept)) if *kept > KEPT_SQUARED_ERROR * least => self.best,
@@ -215,7 +216,7 @@ struct Search<'a> {
     signal: &'a Signal<'a>,
     /// Errors of the trajectories.
     tracks_errors: Vec<WindowErrors>,
-    /// Number of the usual window with the least mean so far, and that mean.
+    /// Index of the best typical window so far, and its mean.
     best: Option<(usize, f64)>,
     past: bool,
 }
@@ -238,7 +239,7 @@ impl<'a> Search<'a> {
                 for (signal, sums) in &mut sums {
                     let (noise, sums) = (signal.sigma * signal.sigma, &mut sums[track]);
                     let estimate = signal.estimate(fit, track, range.clone(), at);
-                    // Windows that would reach over an end are all the one at the end.
+                    // Windows that would extend beyond an end are replaced by the last one inside.
                     if sums.values.last().is_none_or(|(last, _)| *last != at) {
                         sums.values.push((at, estimate.values[2]));
                     }

@@ -44,9 +44,9 @@ pub struct CoordinateSurvey {
     pub acceleration_error: f64,
     /// The error of the accelerations over their size.
     pub acceleration_error_relative: f64,
-    /// Measured velocities against derivatives of positions.
+    /// Comparison of measured velocities with derivatives of positions.
     pub measured_velocity: Option<Consistency>,
-    /// Measured accelerations against second derivatives of positions.
+    /// Comparison of measured accelerations with second derivatives of positions.
     pub measured_acceleration: Option<Consistency>,
     /// Steps of an angle by more than 2 rad, whose direction is ambiguous.
     pub ambiguous_turns: usize,
@@ -55,7 +55,7 @@ pub struct CoordinateSurvey {
 }
 
 impl CoordinateSurvey {
-    /// Surveys coordinate `i`. `alone` smooths positions only, `planned` is the smoothing of a fit.
+    /// Surveys coordinate `i`. `alone` smooths positions only; `planned` is the smoothing that a fit would use.
     pub fn new(recording: &Recording, i: usize, alone: &Smoothing, planned: &Chosen) -> Self {
         let n = recording.n();
         let values = || recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n).copied());

@@ -30,7 +30,7 @@ struct Equation<'a> {
     columns: usize,
     windows: Vec<Window>,
     velocities: Vec<f64>,
-    /// Standard error of the velocities due to the noise of the positions.
+    /// Standard error of the velocities that results from the noise of the positions.
     error: f64,
 }
 
@@ -176,7 +176,7 @@ impl Monomials {
         self.factors.len() + 1
     }
 
-    /// Their values, `(count)`; the first is 1.
+    /// Writes the values of all monomials, `(count)`; the first is 1.
     fn write(&self, x: impl Fn(usize) -> f64, values: &mut [f64]) {
         for (k, (at, variable)) in self.factors.iter().enumerate() {
             values[k + 1] = values[*at] * x(*variable);
@@ -184,18 +184,17 @@ impl Monomials {
     }
 }
 
-/// Motion of first order.
+/// Result for motion of first order.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FirstOrder {
-    /// Other quantities from which, with the positions, the velocities follow.
+    /// Other quantities that determine the velocities together with the positions.
     pub from: Vec<String>,
-    /// Largest residual of a velocity, over its spread.
+    /// Largest residual of a velocity, relative to its spread.
     pub residual: f64,
 }
 
 impl FirstOrder {
-    /// Whether the velocities are determined, to within their errors, by the positions and the inputs of a recording, and not by the
-    /// positions alone.
+    /// Tests whether positions and inputs of a recording determine the velocities to within their errors, while positions alone do not.
     ///
     /// A polynomial of both is fitted to one half of the motion and tested on the other half. Periodic motion driven at a single
     /// frequency also looks like this.

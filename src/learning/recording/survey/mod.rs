@@ -38,7 +38,7 @@ impl Default for SurveyOptions {
     }
 }
 
-/// One trajectory.
+/// Survey of one trajectory.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct TrajectorySurvey {
     /// Its name.
@@ -59,7 +59,7 @@ pub(crate) struct TrajectorySurvey {
     pub jitter: f64,
 }
 
-/// What a survey found.
+/// Results of a survey.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Survey {
     /// Files read.
@@ -102,9 +102,9 @@ pub struct Survey {
     pub accelerates: bool,
     /// Names of coordinates that do not move: nothing can be learned about them.
     pub motionless: Vec<String>,
-    /// Names of coordinates that are functions of those before them: nothing can be learned about both.
+    /// Names of coordinates that are functions of those before them, so that they cannot be learned separately.
     pub copies: Vec<String>,
-    /// Set if the motion is of first order, which needs other columns to be recognised.
+    /// Set if the motion is of first order; recognising that requires other columns.
     pub first_order: Option<FirstOrder>,
     /// Problems of the data that matter for learning.
     pub warnings: Vec<String>,

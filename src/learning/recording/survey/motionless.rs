@@ -11,11 +11,11 @@ use crate::recording::{RecordedTrajectory, Recording};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Stillness {
-    /// It keeps one value in every trajectory.
+    /// Its value is the same within every trajectory.
     Constant(f64),
-    /// It does not scatter more than its noise, of this standard deviation.
+    /// It scatters no more than its noise, of this standard deviation.
     Noise(f64),
-    /// It is this sum of other coordinates and a constant, to within the noise.
+    /// It equals this sum of other coordinates and a constant to within the noise.
     Copy(String),
 }
 
@@ -32,7 +32,7 @@ impl std::fmt::Display for Stillness {
     }
 }
 
-/// Coordinates that do not move or are copies of others, in order, each with the reason.
+/// Returns the coordinates that do not move or are copies of others, in order, with the reasons.
 pub fn stillness(recording: &Recording, smoothing: &Smoothing) -> Vec<(usize, Stillness)> {
     let alone = |i: usize| standing(recording, i, smoothing);
     let mut found: Vec<_> = (0..recording.n()).filter_map(|i| Some((i, alone(i)?))).collect();
@@ -42,8 +42,8 @@ pub fn stillness(recording: &Recording, smoothing: &Smoothing) -> Vec<(usize, St
     found
 }
 
-/// Stillness of coordinate `i` in all trajectories; none if it moves. Motion sampled too coarsely to be distinguished from noise may
-/// move.
+/// Tests whether coordinate `i` is motionless in all trajectories; `None` if it moves. Motion sampled too coarsely to be distinguished from
+/// noise counts as motion.
 fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<Stillness> {
     let n = recording.n();
     let values = |track: usize| recording.tracks[track].q.iter().skip(i).step_by(n);
@@ -54,7 +54,7 @@ fn standing(recording: &Recording, i: usize, smoothing: &Smoothing) -> Option<St
         return Some(Stillness::Constant(*first));
     }
     let noise = smoothing.coordinates.get(i)?.noise;
-    // Numbers whose squares overflow cannot be compared.
+    // Overflowing squares cannot be compared.
     let still =
         noise.resolved && noise.sigma.is_finite() && scatter(recording, i, false) <= MOVING_SCATTER * noise.sigma;
     still.then_some(Stillness::Noise(noise.sigma))
@@ -78,7 +78,7 @@ fn rounding(recording: &Recording, i: usize) -> f64 {
     step.map_or(0.0, |step| step / 12f64.sqrt())
 }
 
-/// Root mean square deviation of coordinate `i` from the mean of each trajectory or, `sloped`, from its straight line over time.
+/// Root mean square deviation of coordinate `i` from the mean of each trajectory, or from its regression line over time if `sloped`.
 fn scatter(recording: &Recording, i: usize, sloped: bool) -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
     for track in &recording.tracks {
@@ -112,13 +112,13 @@ fn copies(recording: &Recording, moving: &[usize], smoothing: &Smoothing) -> Vec
         };
         recording.tracks.iter().flat_map(centred).collect()
     };
-    // Scaled by its largest value, so that no square overflows.
+    // Scaled by the largest value, so that no square overflows.
     let size = |values: &[f64]| {
         let most = values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let mean = values.iter().map(|x| (x / most).powi(2)).sum::<f64>() / values.len() as f64;
         if most > 0.0 { most * mean.sqrt() } else { 0.0 }
     };
-    // The remainder of a coordinate, over its size, and the coefficients of all coordinates in it.
+    // The residual of each coordinate, scaled by its size, and its coefficients over all coordinates.
     let mut kept: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
     let mut found = Vec::new();
     for &i in moving {

@@ -1,4 +1,4 @@
-//! Report of a survey.
+//! Text of a survey.
 
 use super::suspicious::{Kind, Warning};
 use super::thresholds::{LEAST_SAMPLES_PER_PERIOD, ROUNDING_JITTER, SHOWN_ROWS};
@@ -8,7 +8,7 @@ use crate::names::{percent, percentage, pluralize, rounded};
 use crate::recording::read::{Encoding, FileFacts, FileKind, Separator};
 use crate::recording::{LARGE_ACCELERATION_ERROR, Targets};
 
-/// A number with four digits.
+/// Formats a number with four digits.
 fn short(x: f64) -> String {
     rounded(x, 4)
 }
@@ -176,14 +176,14 @@ impl FileFacts {
     }
 }
 
-/// The number of entries that are not shown.
+/// States how many entries are not shown.
 fn more(all: usize, (one, many): (&str, &str)) -> Option<String> {
     let rest = all.checked_sub(SHOWN_ROWS).filter(|rest| *rest > 0)?;
     Some(format!("and {}", pluralize(rest, &format!("more {one}"), &format!("more {many}"))))
 }
 
 impl CoordinateSurvey {
-    /// Unit of the coordinate; velocities and accelerations are in it per s and s^2.
+    /// Unit of the coordinate; velocities have this unit per s, accelerations per s^2.
     fn unit(&self) -> String {
         if self.periodic { "rad" } else { "SI" }.to_string()
     }

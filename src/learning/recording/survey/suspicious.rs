@@ -1,4 +1,4 @@
-//! Samples that do not look like motion: spikes, jumps, kinks, frozen sensors.
+//! Finds samples that do not look like motion: spikes, jumps, kinks, frozen sensors.
 
 use super::thresholds::{
     FROZEN_STEP_GRID, FROZEN_STEP_NOISE, KEPT_WARNINGS, LEAST_FROZEN, LONGEST_CONTRAST, SCALE_SAMPLES,
@@ -10,7 +10,7 @@ use crate::recording::smooth::contrast_weights;
 use crate::recording::statistics::robust_deviation;
 use serde::Serialize;
 
-/// Points of a contrast: sixth differences.
+/// Number of points of a contrast: seven for sixth differences.
 const POINTS: usize = 7;
 
 /// Kind of a suspicious place.
@@ -40,9 +40,9 @@ pub struct Warning {
     pub place: (usize, usize),
     /// Name of the coordinate.
     pub coordinate: String,
-    /// Its kind.
+    /// Kind of the place.
     pub kind: Kind,
-    /// Its value there.
+    /// Value of the coordinate there.
     pub value: f64,
     /// Offset of the sample or of all later ones; of a kink, the change of the velocity; of a frozen sensor,
     /// the number of equal values.
@@ -121,12 +121,12 @@ fn differences(times: &[f64], q: impl Fn(usize) -> f64, z: &mut Vec<f64>) {
     }
 }
 
-/// The pattern that explains most of the contrasts around the peak `k`, its first sample, and its size.
+/// Finds the pattern that explains most of the contrasts around the peak `k`; returns its kind, its first sample and its size.
 fn classify(z: &[f64], k: usize) -> (Kind, usize, f64) {
     // Contrast `j` concerns samples `j..j + 7`; scaled by the norm of the seven weights of equal steps.
     let norm = PATTERNS[0].1.iter().map(|x| x * x).sum::<f64>().sqrt();
     let mut best = (0.0, Kind::Outlier, k + POINTS / 2, 0.0);
-    // Over the peak, so that no square overflows.
+    // Divided by the peak, so that no square overflows.
     let peak = z[k].abs();
     for (kind, pattern) in PATTERNS {
         for first in (k + 2).saturating_sub(pattern.len())..=k {

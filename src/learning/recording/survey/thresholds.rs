@@ -19,9 +19,9 @@ pub(super) const TURN_TOLERANCE: f64 = 0.15;
 /// Largest jitter that counts as rounding of the times and is shown as 0.
 pub(super) const ROUNDING_JITTER: f64 = 1e-9;
 
-// ---- Measured derivatives beside those of the positions ----
+// ---- Measured derivatives and those of the positions ----
 
-/// Largest deviation from 1 of the ratio of a measured derivative to the computed one, both without error.
+/// Largest deviation from 1 of the ratio of a measured derivative to the computed one, if both were exact.
 pub(super) const RATIO_TOLERANCE: f64 = 0.05;
 /// Further deviation, in squares of the relative error of the computed derivative: twice the bias that this error causes in the slope of a
 /// regression.
@@ -43,7 +43,7 @@ pub(super) const MOST_DECIMAL_PLACES: i32 = 9;
 pub(super) const GRID_ROUNDING: f64 = 1e-9;
 /// Share of a copy's motion from which a term of its sum is shown.
 pub(super) const SHOWN_TERM: f64 = 1e-3;
-/// Samples that are examined for copies, about; more are thinned evenly.
+/// Approximate number of samples that are examined for copies; more are thinned evenly.
 pub(super) const COPY_SAMPLES: usize = 1 << 16;
 
 // ---- Suspicious samples ----
@@ -58,20 +58,20 @@ pub(super) const LEAST_FROZEN: usize = 8;
 /// sensor's grid: a curve on a grid rests at its turning points, but leaves them one step of the grid at a time.
 pub(super) const FROZEN_STEP_NOISE: f64 = 6.0;
 pub(super) const FROZEN_STEP_GRID: f64 = 3.0;
-/// Warnings that are kept in detail.
+/// Largest number of warnings that are kept in detail.
 pub(super) const KEPT_WARNINGS: usize = 1000;
-/// Samples of a trajectory that its robust scale is estimated from, about; the error of a standard deviation is then 0.5 %.
+/// Approximate number of samples from which the robust scale of a trajectory is estimated; the error of a standard deviation is then 0.5 %.
 pub(super) const SCALE_SAMPLES: usize = 1 << 16;
-/// Rows of a table that can be long.
+/// Largest number of rows shown of a long table.
 pub(super) const SHOWN_ROWS: usize = 20;
 
 // ---- Motion of first order (chosen by `lnn-studies rates --part check`) ----
 
 /// Largest residual of a velocity over its standard error.
 pub(super) const RESIDUAL_OVER_ERROR: f64 = 2.5;
-/// Residual, over the spread of the velocity, that is always accepted.
+/// Residual, relative to the spread of the velocity, that is always accepted.
 pub(super) const ACCEPTED_RESIDUAL: f64 = 0.03;
-/// The same from which on the fit is never accepted.
+/// Residual, relative to the spread of the velocity, above which the fit is never accepted.
 pub(super) const REFUSED_RESIDUAL: f64 = 0.35;
 /// Smallest factor by which the residual of at least one velocity grows if the other quantities are left out.
 pub(super) const GAIN_BY_OTHERS: f64 = 2.0;
@@ -87,7 +87,7 @@ pub(super) const WINDOWS_PER_TERM: usize = 8;
 pub(super) const WINDOW_OVERLAP: f64 = 8.0;
 /// Largest number of windows.
 pub(super) const MOST_WINDOWS: f64 = 4000.0;
-/// Windows of a block. Every other block is fitted and the others test the fit; a block is four widths of a window long.
+/// Number of windows in a block. Blocks are alternately fitted and tested; a block is four window widths long.
 pub(super) const WINDOW_BLOCK: usize = 64;
 /// Fewest windows, which leave half a block to test the fit.
 pub(super) const LEAST_WINDOWS: usize = WINDOW_BLOCK + WINDOW_BLOCK / 2;

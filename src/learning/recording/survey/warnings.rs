@@ -91,14 +91,14 @@ fn coordinate_warnings(c: &CoordinateSurvey, survey: &Survey) -> Vec<String> {
     all
 }
 
-/// A measured derivative against the derivative of the positions.
+/// Comparison of a measured derivative with the derivative of the positions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Consistency {
-    /// Least-squares ratio of the measured one to the computed one; 1 if they agree.
+    /// Least-squares ratio of the measured derivative to the computed one; 1 if they agree.
     pub factor: f64,
     /// Correlation of the two.
     pub correlation: f64,
-    /// Relative error of the computed one.
+    /// Relative error of the computed derivative.
     pub uncertainty: f64,
 }
 
@@ -109,7 +109,7 @@ impl Consistency {
         (self.factor - 1.0).abs() <= doubt && self.correlation >= LEAST_CORRELATION - self.uncertainty
     }
 
-    /// The likely mistake, if the factor is that of a common one.
+    /// The likely mistake, if the factor is typical of one.
     pub fn mistake(&self, step: f64) -> Option<&'static str> {
         let known = [
             (180.0 / PI, "degrees where radians are expected?"),
@@ -130,7 +130,7 @@ impl Consistency {
     }
 }
 
-/// Compares the measured derivative 1 or 2 of coordinate `i` with the computed one.
+/// Compares the measured derivative of order 1 or 2 of coordinate `i` with the computed one.
 pub fn compare(recording: &Recording, i: usize, derivative: usize, smoothing: &Smoothing) -> Consistency {
     let n = recording.n();
     let (mut product, mut computed, mut measured) = (0.0, 0.0, 0.0);
