@@ -1,4 +1,5 @@
-//! Shape of a network Lagrangian, and its activations: one for the whole network, or one for each of several networks that add up.
+//! Shape of a network Lagrangian and its activations: one for the whole network, or one for each of several networks whose outputs are
+//! added.
 
 use super::Form;
 use crate::network::Activation;
@@ -13,16 +14,16 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Initialization {
-    /// Uniform in `+-1/sqrt(fan_in)`, weights and biases.
+    /// Uniform in `+-1/sqrt(fan_in)`, for weights and biases.
     Default,
-    /// Normal, `gain/sqrt(fan_in)` with `gain = 1/sqrt(E[act'(Z)^2])`, `Z` standard normal; zero biases.
+    /// Normal with standard deviation `gain/sqrt(fan_in)`, where `gain = 1/sqrt(E[act'(Z)^2])` and `Z` is standard normal; zero biases.
     VariancePreserving,
-    /// Normal, zero biases; as the code of Cranmer et al. (2020) has it: `2.2/sqrt(n)` for the first map, `0.58 i/sqrt(n)` for
-    /// the `i`-th after it (`i` = 1, 2, ..), `sqrt(n)` for the output, `n` the larger side of the map.
+    /// Normal with zero biases, as in the code of Cranmer et al. (2020): standard deviation `2.2/sqrt(n)` for the first map, `0.58
+    /// i/sqrt(n)` for the `i`-th after it (`i` = 1, 2, ..), `sqrt(n)` for the output, where `n` is the larger side of the map.
     Cranmer,
-    /// As in Hamzaogullari and Ozakin: `0.58 i/sqrt(n)` for the `i`-th map of all (`i` = 2, 3, ..), with `n` the `fan_in`.
+    /// As in Hamzaogullari and Ozakin: `0.58 i/sqrt(n)` for the `i`-th of all maps (`i` = 2, 3, ..), where `n` is the `fan_in`.
     CranmerPaper,
-    /// As `Default`, the output layer scaled by 0.01, so that `L` starts as `alpha |v|^2` (Liu et al. 2021).
+    /// As `Default`, with the output layer scaled by 0.01, so that initially `L` is close to `alpha |v|^2` (Liu et al. 2021).
     NearZero,
 }
 
@@ -31,76 +32,76 @@ pub enum Initialization {
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum InputLayer {
-    /// Nothing.
+    /// No layer.
     #[default]
     None,
-    /// Dynamic tanh, `gamma_i tanh(a x_i) + beta_i`, with learned `a`, initially 0.5, `gamma`, ones, and `beta`, zeros
-    /// (Zhu et al. 2025). Every branch has its own.
+    /// Dynamic tanh, `gamma_i tanh(a x_i) + beta_i`, with learned `a`, `gamma` and `beta`, which start at 0.5, ones and zeros (Zhu et al.
+    /// 2025). Every branch has a separate layer.
     Dyt,
 }
 
 impl InputLayer {
-    /// `true` if there is none.
+    /// Returns `true` if there is no input layer.
     pub(crate) fn is_none(&self) -> bool {
         *self == Self::None
     }
 }
 
-/// Everything that determines a network Lagrangian but its weights.
+/// Everything that determines a network Lagrangian except its weights.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Architecture {
     /// Number of coordinates `n`.
     pub coordinates: usize,
-    /// Widths of the hidden layers; the paper's "4 layers of 500" is `[500, 500, 500]` and a linear output without bias.
-    /// The branches of a hybrid share them equally.
+    /// Widths of the hidden layers; the paper's "4 layers of 500" is `[500, 500, 500]` and a linear output without bias. The branches of a
+    /// hybrid share the widths equally.
     pub hidden: Vec<usize>,
     /// Activation of the hidden layers.
     pub activation: ActivationChoice,
-    /// Factor of the added `|v|^2` of scaled velocities; 0 leaves it out.
+    /// Coefficient of the added `|v|^2` of scaled velocities; 0 for none.
     pub alpha: f64,
-    /// The coordinate whose square counts negative in the added term: `alpha (-t'^2 + x'^2 + ..)`, the signature of a
-    /// spacetime. Without it all squares are added.
+    /// The coordinate whose square is subtracted in the added term: `alpha (-t'^2 + x'^2 + ..)`, the signature of a spacetime. Without it
+    /// all squares are added.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub time_like: Option<usize>,
-    /// Scale `s_i` of each coordinate: the network sees `q_i/s_i`, `v_i/s_i`. Ones: no scaling.
+    /// Scale `s_i` of each coordinate: the inputs of the network are `q_i/s_i`, `v_i/s_i`. Ones mean no scaling.
     pub scale: Vec<f64>,
-    /// Which coordinates are angles with period `2 pi` (wrapped before the network sees them).
+    /// Which coordinates are angles with period `2 pi`, which are wrapped before the network.
     pub periodic: Vec<bool>,
-    /// Feed `sin q_i`, `cos q_i` of the periodic coordinates instead of `q_i/s_i`.
+    /// `true` to use `sin q_i`, `cos q_i` of the periodic coordinates as inputs instead of `q_i/s_i`.
     pub embed_periodic: bool,
-    /// Layer before the first dense one; files without this key have none.
+    /// Layer before the first dense one; absent in files without this key.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "InputLayer::is_none"))]
     pub input_layer: InputLayer,
-    /// Units of the Rayleigh dissipation `D(q, v)`; without it the motion conserves its energy.
+    /// Number of units of the Rayleigh dissipation `D(q, v)`; without it the motion conserves its energy.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub dissipation: Option<usize>,
-    /// Prior knowledge of the Lagrangian; files without this key have none.
+    /// Prior knowledge of the Lagrangian; absent in files without this key.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Form::is_default"))]
     pub form: Form,
 }
 
-/// Builds the choice from the rows of the table of activations.
+/// Defines the choices from the rows of the table of activations.
 macro_rules! choices {
     ($($(#[$($doc:tt)*])* $name:ident $text:literal;)*) => {
-        /// Activation of the hidden layers, as a configuration chooses it.
+        /// Activation of the hidden layers, as chosen in a configuration.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
         #[non_exhaustive]
         pub enum ActivationChoice {
             $($(#[$($doc)*])* #[cfg_attr(feature = "serde", serde(rename = $text))] $name,)*
-            /// Two networks of half the widths added up, one with `ln(1 + e^x)`, one with `x^2` (Liu et al. 2021).
+            /// Sum of two networks with half of the widths, one with `ln(1 + e^x)`, one with `x^2` (Liu et al. 2021).
             #[cfg_attr(feature = "serde", serde(rename = "quadratic-softplus"))]
             QuadraticSoftplus,
         }
 
         impl ActivationChoice {
-            /// Every choice.
+            /// All choices.
             pub const ALL: [Self; [$($text),*].len() + 1] = [$(Self::$name,)* Self::QuadraticSoftplus];
             /// The names of all choices, separated by commas.
             pub const NAMES: &'static str = concat!($($text, ", ",)* "quadratic-softplus");
 
-            /// Activation of each branch; the branches share the widths equally.
+            /// Returns the activation of each branch; the branches share the widths equally.
             pub fn branches(self) -> &'static [Activation] {
                 match self {
                     $(Self::$name => &[Activation::$name],)*
@@ -114,7 +115,7 @@ macro_rules! choices {
 crate::ops::activations! { choices }
 
 impl ActivationChoice {
-    /// The name in configuration files.
+    /// Returns the name in configuration files.
     pub fn name(self) -> &'static str {
         match self.branches() {
             [single] => single.name(),
@@ -129,7 +130,7 @@ impl core::fmt::Display for ActivationChoice {
     }
 }
 
-/// A text that names no activation.
+/// The error for a text that is not the name of an activation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownActivation(pub String);
 

@@ -1,4 +1,4 @@
-//! The recorded functions of a model, and their terms on a chunk of states.
+//! The recorded functions of a model, and their evaluation on a chunk of states.
 
 use crate::lagrangian::Lagrangian;
 use crate::network::{Architecture, Layout};
@@ -17,13 +17,13 @@ pub struct Model<S> {
 }
 
 impl<S: Scalar> Model<S> {
-    /// A model of `lagrangian`, which shares its scales and parameters with `dissipation`; `periodic` coordinates are angles that
-    /// [`Model::wrap`] reduces to `[0, 2 pi)`.
+    /// Creates a model of `lagrangian`, which shares its scales and parameters with `dissipation`. The `periodic` coordinates are angles
+    /// that [`Model::wrap`] reduces to `[0, 2 pi)`.
     pub fn new(lagrangian: Arc<Recorded<S>>, dissipation: Option<Arc<Recorded<S>>>, periodic: Vec<bool>) -> Self {
         let weights = lagrangian.parameters();
         Self { lagrangian, dissipation, periodic, weights }
     }
-    /// This model with physical constants after its first `weights` parameters: weight decay does not pull them to zero.
+    /// Declares the parameters after the first `weights` as physical constants, to which weight decay does not apply.
     ///
     /// # Panics
     /// If there are fewer parameters.
@@ -31,31 +31,31 @@ impl<S: Scalar> Model<S> {
         assert!(weights <= self.parameters(), "weights among {} parameters", self.parameters());
         Self { weights, ..self }
     }
-    /// The Lagrangian.
+    /// Returns the Lagrangian.
     pub fn lagrangian(&self) -> &Arc<Recorded<S>> {
         &self.lagrangian
     }
-    /// The dissipation, if there is one.
+    /// Returns the dissipation, if there is one.
     pub fn dissipation(&self) -> Option<&Arc<Recorded<S>>> {
         self.dissipation.as_ref()
     }
-    /// Number of coordinates `n`.
+    /// Returns the number of coordinates `n`.
     pub fn coordinates(&self) -> usize {
         self.lagrangian.coordinates()
     }
-    /// Number of parameters.
+    /// Returns the number of parameters.
     pub fn parameters(&self) -> usize {
         self.lagrangian.parameters()
     }
-    /// Number of parameters that are weights of a network, the first ones.
+    /// Returns the number of network weights, which are the first parameters.
     pub fn weights(&self) -> usize {
         self.weights
     }
-    /// Scales `s_i` of the coordinates.
+    /// Returns the scales `s_i` of the coordinates.
     pub fn scale(&self) -> &[S] {
         self.lagrangian.scale()
     }
-    /// Reduces the periodic coordinates of states `(batch, n)` to `[0, 2 pi)`, where the functions know them.
+    /// Reduces the periodic coordinates of states `(batch, n)` to `[0, 2 pi)`, the range of the training data.
     pub fn wrap(&self, q: &mut [S]) {
         for row in q.chunks_exact_mut(self.periodic.len()) {
             for (q, _) in row.iter_mut().zip(&self.periodic).filter(|(_, periodic)| **periodic) {
@@ -63,17 +63,17 @@ impl<S: Scalar> Model<S> {
             }
         }
     }
-    /// Offset among the parameters, rows and columns of every weight matrix of the Lagrangian, in order.
+    /// Returns the offset among the parameters, rows and columns of every weight matrix of the Lagrangian, in order.
     pub fn matrices(&self) -> Vec<(usize, usize, usize)> {
         self.lagrangian.matrices()
     }
 }
 
 impl Architecture {
-    /// The functions of a network of this shape, recorded.
+    /// Records the functions of a network of this shape.
     ///
     /// # Panics
-    /// If the architecture contradicts itself (see [`Architecture::validate`]).
+    /// If the architecture is inconsistent (see [`Architecture::validate`]).
     #[doc(hidden)]
     pub fn model<S: Scalar>(&self) -> Model<S> {
         let scale = || self.scale.iter().map(|&s| S::of_f64(s)).collect();
@@ -89,8 +89,7 @@ impl Architecture {
     }
 }
 
-/// The terms of a model on a chunk of at most [`LANES`](crate::tape::STATES) states, in scaled coordinates; buffers are reused
-/// from call to call.
+/// Evaluates a model on chunks of at most [`LANES`](crate::tape::STATES) states, in scaled coordinates; buffers are reused.
 #[derive(Debug)]
 pub struct Dynamics<S> {
     lagrangian: Evaluation<S>,
@@ -100,7 +99,7 @@ pub struct Dynamics<S> {
 }
 
 impl<S: Scalar> Dynamics<S> {
-    /// Buffers for a model.
+    /// Allocates the buffers for a model.
     pub fn new(model: &Model<S>) -> Self {
         Self {
             lagrangian: Evaluation::new(Arc::clone(&model.lagrangian)),
@@ -109,7 +108,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Evaluates states `q`, `v`, `(batch, n)` in physical units, with angles not wrapped; the dissipation's force only if `forces`.
+    /// Evaluates states `q`, `v`, `(batch, n)`, in physical units with unwrapped angles; friction forces only if `forces` is set.
     pub fn evaluate(&mut self, parameters: &[S], q: &[S], v: &[S], depth: Depth, forces: bool) {
         self.lagrangian.evaluate(parameters, q, v, depth);
         let Some(dissipation) = self.dissipation.as_mut().filter(|_| forces) else { return };
@@ -122,25 +121,25 @@ impl<S: Scalar> Dynamics<S> {
         self.power.extend(rows.map(|(gradient, v)| {
             let terms = gradient.iter().zip(v).zip(scale);
             let power = terms.fold(zero, |sum, ((&d, &v), &s)| sum + d * (v / s));
-            // Friction opposes the velocity, so negative values are rounding.
+            // Friction opposes the velocity, so that negative values are rounding errors.
             if power < zero { zero } else { power }
         }));
     }
 
-    /// The Lagrangian's terms.
+    /// Returns the terms of the Lagrangian.
     pub fn lagrangian(&self) -> &Evaluation<S> {
         &self.lagrangian
     }
-    /// `dD/d(v/s)`, `(batch, n)`, of a model that dissipates: minus the generalized force.
+    /// Returns `dD/d(v/s)`, `(batch, n)`, the negative generalized force, of a model with dissipation.
     pub fn friction(&self) -> Option<&[S]> {
         self.dissipation.as_ref().map(|dissipation| dissipation.momentum.as_slice())
     }
-    /// The power `v.dD/dv` taken away, `(batch)`, never negative; empty without a dissipation.
+    /// Returns the dissipated power `v.dD/dv`, `(batch)`, which is never negative; empty without dissipation.
     pub fn power(&self) -> &[S] {
         &self.power
     }
 
-    /// Right-hand sides `g - c - dD/d(v/s)` of `M a = ..`, `(batch, n)`, into `right`.
+    /// Writes the right sides `g - c - dD/d(v/s)` of `M a = ..`, `(batch, n)`, to `right`.
     pub fn right_hand_sides(&self, right: &mut Vec<S>) {
         right.clear();
         right.extend(self.lagrangian.dl_dq.iter().zip(&self.lagrangian.coriolis).map(|(&g, &c)| g - c));
@@ -152,7 +151,7 @@ impl<S: Scalar> Dynamics<S> {
     /// Adds the derivative of a sum of mixed coefficients to `gradient`, and of the dissipation's contribution to accelerations: with `s =
     /// -M^-1 u`, `t = a` and moving directions, `u da/dtheta`, and to `inputs` `u da/d(q/s)` and `u da/d(v/s)`.
     ///
-    /// The states are those evaluated last, to [`Depth::Training`] and with forces; all their numbers are finite.
+    /// The states are those of the last evaluation, which must be to [`Depth::Training`] with forces; all their numbers must be finite.
     pub fn add_gradient(
         &mut self,
         parameters: &[S],

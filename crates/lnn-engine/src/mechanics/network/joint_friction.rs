@@ -1,13 +1,13 @@
-//! Friction of every coordinate individually, as in the joints of a machine: with a Rayleigh dissipation, or alone.
+//! Friction of every coordinate individually, as in the joints of a machine; with or without a Rayleigh dissipation.
 //!
-//! With the scaled velocity `w` of a coordinate and the size `F` of its friction, [`Sizes::friction`](super::Sizes), it is the dissipation
+//! Let `w` be the scaled velocity of a coordinate and `F` the size of its friction, [`Sizes::friction`](super::Sizes). The dissipation
 //!
 //! ```text
 //! F (softplus(a) w^2/2 + softplus(b) k ln cosh(w/k) + softplus(c) u (1 - exp(-(w/u)^2)))
 //! ```
 //!
-//! of a viscous force, a dry one that saturates beyond the speed `k = exp(knee)`, and, for [`JointFriction::Stribeck`], an additional one
-//! near the speed `u = exp(fall)` that falls off beyond. All three forces oppose the velocity.
+//! consists of a viscous force, a dry one that saturates beyond the speed `k = exp(knee)`, and, for [`JointFriction::Stribeck`], an
+//! additional one near the speed `u = exp(fall)` that decreases at higher speeds. All three forces oppose the velocity.
 
 use crate::scalar::Real;
 use alloc::vec::Vec;
@@ -19,33 +19,33 @@ use serde::{Deserialize, Serialize};
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum JointFriction {
-    /// None.
+    /// No friction.
     #[default]
     None,
     /// Viscous and dry friction.
     Dry,
-    /// Viscous and dry friction, and a larger one at low speeds.
+    /// Viscous and dry friction, with additional friction at low speeds.
     Stribeck,
 }
 
-/// Initial strengths: `softplus(-3) = 0.049` of the size.
+/// Initial parameter of the coefficients: `softplus(-3) = 0.049` of the size.
 const STRENGTH: f64 = -3.0;
-/// Initial knee and fall: 0.05 of the scale of the velocities.
+/// Initial knee and fall, as a fraction of the velocity scale.
 const SPEED: f64 = 0.05;
 
 impl JointFriction {
-    /// `true` if there is none.
+    /// Returns `true` if there is no joint friction.
     pub(crate) fn is_none(&self) -> bool {
         *self == Self::None
     }
 
-    /// Initial parameters of `n` coordinates, row by row: `a`, `b`, the knee, then `c` and the fall.
+    /// Returns the initial parameters of `n` coordinates, row by row: `a`, `b`, the knee, then `c` and the fall.
     pub(super) fn initial(self, n: usize) -> Vec<f64> {
         let rows = [STRENGTH, STRENGTH, SPEED.ln(), STRENGTH, SPEED.ln()];
         rows.into_iter().take(self.rows()).flat_map(|row| vec![row; n]).collect()
     }
 
-    /// Parameters of one coordinate.
+    /// Returns the number of parameters of one coordinate.
     pub(crate) fn rows(self) -> usize {
         match self {
             Self::None => 0,
@@ -54,7 +54,7 @@ impl JointFriction {
         }
     }
 
-    /// The dissipation at scaled velocities, from the parameters; `size` is the size of each coordinate's friction.
+    /// Computes the dissipation at scaled velocities; `size` is the size of each coordinate's friction.
     pub(super) fn dissipation<R: Real>(self, parameters: &[R], velocities: &[R], size: impl Fn(usize) -> f64) -> R {
         let n = velocities.len();
         let rows: Vec<&[R]> = parameters.chunks_exact(n).collect();

@@ -1,4 +1,4 @@
-//! Positions of the parameters of a network in its flat vector, for a sum of branches, each a chain of layers; initial weights.
+//! Positions of the parameters of a network in its flat vector, for a sum of branches that are chains of layers; and initial weights.
 
 use crate::lagrangian::Description;
 use crate::network::{Activation, Architecture, Initialization, InputLayer};
@@ -8,14 +8,14 @@ use core::ops::Range;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Action of a layer's weights `W` on its inputs `x`.
+/// How a layer's weights `W` act on its inputs `x`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinearMap {
-    /// `W x`, `W` of shape `(outputs, inputs)` row-major.
+    /// `W x`, with `W` of shape `(outputs, inputs)`, row-major.
     Dense,
-    /// `gamma_i x_i`, one weight per unit.
+    /// `gamma_i x_i`, with one weight per unit.
     Diagonal,
-    /// `a x_i`, one weight for all units.
+    /// `a x_i`, with one weight for all units.
     Scalar,
 }
 
@@ -24,20 +24,20 @@ pub enum LinearMap {
 pub struct Layer {
     /// Kind of the linear map.
     pub map: LinearMap,
-    /// Function after the affine map, elementwise.
+    /// Activation, applied elementwise after the affine map.
     pub activation: Activation,
-    /// Numbers in.
+    /// Number of inputs.
     pub inputs: usize,
-    /// Numbers out; as many as go in unless the map is dense.
+    /// Number of outputs; equal to the number of inputs unless the map is dense.
     pub outputs: usize,
     /// Offset of `W`.
     pub weight: usize,
-    /// Offset of `b`, `(outputs)`; the output layer has none (a constant in `L` has no effect).
+    /// Offset of `b`, `(outputs)`; `None` for the output layer of a single number, since a constant in `L` has no effect.
     pub bias: Option<usize>,
 }
 
 impl Layer {
-    /// Range of the weights.
+    /// Returns the range of the weights.
     pub fn weight_range(&self) -> Range<usize> {
         let count = match self.map {
             LinearMap::Dense => self.inputs * self.outputs,
@@ -46,61 +46,61 @@ impl Layer {
         };
         self.weight..self.weight + count
     }
-    /// Range of the bias, empty if there is none.
+    /// Returns the range of the bias, which may be empty.
     pub fn bias_range(&self) -> Range<usize> {
         self.bias.map_or(0..0, |start| start..start + self.outputs)
     }
 }
 
-/// A chain of layers, the last one dense and linear: one output without a bias, or the outputs of a structure with theirs.
+/// A chain of layers, the last of which is dense and linear: one output without a bias, or the outputs of a structure with biases.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Branch {
-    /// Layers, input to output.
+    /// Layers from input to output.
     pub layers: Vec<Layer>,
 }
 
 impl Branch {
-    /// All layers but the output.
+    /// Returns all layers except the output.
     pub fn hidden(&self) -> &[Layer] {
         &self.layers[..self.layers.len() - 1]
     }
-    /// Weights of the linear output.
+    /// Returns the range of the weights of the linear output.
     #[cfg(test)]
     pub fn output_range(&self) -> Range<usize> {
         self.layers[self.layers.len() - 1].weight_range()
     }
 }
 
-/// The branches of a network, whose outputs add up, one after the other in the flat parameter vector; then the dissipation, then the
-/// parameters of a known part.
+/// The flat parameter vector: first the branches of a network, whose outputs are added, then the dissipation, then the parameters of a
+/// known part.
 ///
-/// Every layer holds its weights, then its biases.
+/// For every layer the weights come before the biases.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// Branches; all start from the input features.
+    /// Branches, which all have the same input features.
     pub branches: Vec<Branch>,
     /// Length of the flat parameter vector.
     pub parameters: usize,
-    /// Input features made of coordinates.
+    /// Number of input features computed from coordinates.
     pub position_features: usize,
-    /// Input features: those of the coordinates, then one per velocity for a black box.
+    /// Number of all input features; a black box has one more per velocity.
     pub features: usize,
-    /// Parameters of the dissipation, after those of all branches.
+    /// Parameters of the dissipation, which follow those of all branches.
     pub dissipation: Option<DissipationLayout>,
-    /// Parameters of the structure outside the network, such as `alpha` of a black box that learns it.
+    /// Parameters of the structure outside the network, such as a learned `alpha` of a black box.
     pub constants: Range<usize>,
     /// Parameters of the joint friction, `(rows, n)`.
     pub joint_friction: Range<usize>,
-    /// Parameters of the learned constants of a known part, the last ones.
+    /// Parameters for the learned constants of a known part, which come last.
     pub known: Range<usize>,
 }
 
 /// Positions of the parameters of a Rayleigh dissipation: `gamma`, then `w`, then `b`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DissipationLayout {
-    /// Units `K`.
+    /// Number of units `K`.
     pub units: usize,
-    /// Input features made of coordinates, `F`.
+    /// Number of input features computed from coordinates, `F`.
     pub features: usize,
     /// Number of coordinates `n`.
     pub coordinates: usize,
@@ -109,16 +109,16 @@ pub struct DissipationLayout {
 }
 
 impl DissipationLayout {
-    /// Range of `gamma`, `(K)`.
+    /// Returns the range of `gamma`, `(K)`.
     pub fn gamma_range(&self) -> Range<usize> {
         self.offset..self.offset + self.units
     }
-    /// Range of `w`, `(K, F)` row-major.
+    /// Returns the range of `w`, `(K, F)`, row-major.
     pub fn weight_range(&self) -> Range<usize> {
         let start = self.gamma_range().end;
         start..start + self.units * self.features
     }
-    /// Range of `b`, `(K, n)` row-major.
+    /// Returns the range of `b`, `(K, n)`, row-major.
     pub fn direction_range(&self) -> Range<usize> {
         let start = self.weight_range().end;
         start..start + self.units * self.coordinates
@@ -126,13 +126,13 @@ impl DissipationLayout {
 }
 
 impl Layout {
-    /// Offset, rows and columns of every dense weight matrix, in order.
+    /// Returns offset, rows and columns of every dense weight matrix, in order.
     pub fn matrices(&self) -> impl Iterator<Item = (usize, usize, usize)> {
         let layers = self.branches.iter().flat_map(|branch| &branch.layers);
         layers.filter(|layer| layer.map == LinearMap::Dense).map(|layer| (layer.weight, layer.outputs, layer.inputs))
     }
-    /// Layout of an architecture: one branch per activation of its nonlinearity, each with an equal share of the widths
-    /// and an input layer of its own.
+    /// Computes the layout of an architecture: one branch per activation, each with an equal share of the widths and a separate input
+    /// layer.
     pub fn new(architecture: &Architecture) -> Self {
         let position_features = architecture.position_features();
         let (n, form) = (architecture.coordinates, &architecture.form);
@@ -176,12 +176,12 @@ impl Layout {
     }
 }
 
-/// A branch in the making.
+/// A branch under construction.
 struct Chain {
     layers: Vec<Layer>,
-    /// Outputs of the last layer.
+    /// Number of outputs of the last layer.
     width: usize,
-    /// End of its parameters.
+    /// End of its parameters so far.
     offset: usize,
 }
 
@@ -198,18 +198,18 @@ impl Chain {
     }
 }
 
-/// Constants of a known part that are learned.
+/// Returns the number of learned constants in a known part.
 fn learned(description: &Description) -> usize {
     description.parameters.values().filter(|parameter| parameter.learn).count()
 }
 
-/// Initial scale of the argument of a dynamic tanh (Zhu et al. 2025).
+/// Initial scale of the argument of dynamic tanh (Zhu et al. 2025).
 const DYT_ALPHA: f64 = 0.5;
 
 /// Factor of the output weights under [`Initialization::NearZero`].
 const NEAR_ZERO: f64 = 0.01;
 
-/// Initial `gamma` of every unit of a dissipation: the friction starts at `ln(1 + e^-5) = 0.0067`.
+/// Initial `gamma` of every unit of a dissipation: the friction coefficient starts at `ln(1 + e^-5) = 0.0067`.
 const FRICTION: f64 = -5.0;
 
 /// Draws the flat parameters of a network; the same generator state gives the same weights in every precision.
@@ -217,11 +217,11 @@ const FRICTION: f64 = -5.0;
 /// Every branch is drawn separately, with its own widths and gains; the gain of a linear layer is 1. The parameters of an input layer are
 /// not random: `a = 0.5`, `gamma = 1`, `beta = 0`.
 ///
-/// Those of a dissipation are drawn after all others, which are the same without it: `gamma = -5`, `w = 0`, and `b` of length 1 in random
-/// directions.
+/// The parameters of a dissipation are drawn last, so that all others do not depend on it: `gamma = -5`, `w = 0`, and `b` of length 1 in
+/// random directions.
 ///
-/// A structure begins, unless near zero, with a tenth (a rectangle: three tenths) of these output weights and with output biases that are those of 1.7
-/// times the identity.
+/// Unless near zero, a structure starts with a tenth (a rectangle: three tenths) of these output weights, and with the output biases that
+/// give 1.7 times the identity.
 pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initialization, rng: &mut impl Rng) -> Vec<S> {
     let layout = Layout::new(architecture);
     let mut weights = vec![<S as Real>::zero(); layout.parameters];
@@ -260,8 +260,8 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
     weights
 }
 
-/// Initializes a structure with a mass matrix near 1.7 times the identity and almost no forces: a random metric would have curvature forces
-/// at every velocity, which would have to be unlearned first.
+/// Initializes a structure with a mass matrix near 1.7 times the identity and almost no forces. A random metric would have curvature forces
+/// at every velocity, which training would have to remove first.
 fn settle<S: Scalar>(layout: &Layout, biases: &[(usize, f64)], variation: f64, weights: &mut [S]) {
     for (k, branch) in layout.branches.iter().enumerate() {
         let output = &branch.layers[branch.layers.len() - 1];
@@ -274,17 +274,17 @@ fn settle<S: Scalar>(layout: &Layout, biases: &[(usize, f64)], variation: f64, w
     }
 }
 
-/// A vector of length 1, its direction uniform.
+/// Draws a vector of length 1 with a uniformly distributed direction.
 fn draw_direction<S: Scalar>(rng: &mut impl Rng, direction: &mut [S]) {
     let normal: Vec<f64> = direction.iter().map(|_| StandardNormal.sample(rng)).collect();
-    // Never 0, unless the generator gives only zeros.
+    // The length is never 0, unless the generator returns only zeros.
     let length = normal.iter().map(|x: &f64| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     for (x, normal) in direction.iter_mut().zip(normal) {
         *x = S::of_f64(normal / length);
     }
 }
 
-/// Position of a dense layer in its branch.
+/// The position of a dense layer in its branch.
 #[derive(Clone, Copy, PartialEq)]
 enum Place {
     /// Hidden layer, counted from 0.
@@ -293,7 +293,7 @@ enum Place {
     Output,
 }
 
-/// Draws the parameters of a dense layer; `weights` are flat over all parameters, and zero.
+/// Draws the parameters of a dense layer; `weights` contains all parameters and is initially zero.
 fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut impl Rng, weights: &mut [S]) {
     let side = if kind == Initialization::Cranmer { layer.inputs.max(layer.outputs) } else { layer.inputs };
     let root = (side as f64).sqrt();
@@ -350,12 +350,12 @@ mod tests {
         (numbers.iter().map(|w| w * w).sum::<f64>() / numbers.len().max(1) as f64).sqrt()
     }
 
-    /// Within four standard errors of a sample deviation over `count` weights.
+    /// Checks that a sample deviation is within four standard errors for `count` weights.
     fn near(found: f64, expected: f64, count: usize) {
         assert!((found / expected - 1.0).abs() < 4.0 / (2.0 * count as f64).sqrt(), "{found} for {expected}");
     }
 
-    /// Deviations of weights and biases of a single network and of both branches of a hybrid, against `expected(widths,
+    /// Compares deviations of weights and biases, for a single network and for both branches of a hybrid, with `expected(widths,
     /// activation)`: weights and biases of every layer.
     fn every_branch_follows(kind: Initialization, expected: impl Fn([f64; 3], Activation) -> [[f64; 2]; 3]) {
         for choice in [ActivationChoice::Softplus, ActivationChoice::XTanh, ActivationChoice::QuadraticSoftplus] {
@@ -380,7 +380,7 @@ mod tests {
         }
     }
 
-    /// Deviation of numbers uniform within the inverse root of the fan-in.
+    /// Returns the standard deviation of a uniform distribution within the inverse root of the fan-in.
     fn uniform(fan_in: f64) -> f64 {
         (3.0 * fan_in).sqrt().recip()
     }
@@ -403,7 +403,7 @@ mod tests {
     #[test]
     fn cranmer_weights_follow_the_code_of_their_author() {
         every_branch_follows(Initialization::Cranmer, |n, _| {
-            // The larger sides: the first width twice, then the second.
+            // The larger sides of the maps are the first width twice, then the second.
             [[2.2 / n[1].sqrt(), 0.0], [0.58 / n[1].sqrt(), 0.0], [n[2].sqrt(), 0.0]]
         });
         deep_maps_deviate_by(Initialization::Cranmer, [2.2 / 10.0, 0.58 / 10.0, 1.16 / 10.0, 1.74 / 10.0, 10.0]);
@@ -417,7 +417,7 @@ mod tests {
         deep_maps_deviate_by(Initialization::CranmerPaper, [1.1, 1.16 / 10.0, 1.74 / 10.0, 2.32 / 10.0, 10.0]);
     }
 
-    /// Deviations of the maps of four layers of 100.
+    /// Compares the deviations of the maps of four layers of 100.
     fn deep_maps_deviate_by(kind: Initialization, expected: [f64; 5]) {
         let deeper = Architecture { hidden: vec![100; 4], ..architecture(ActivationChoice::Gelu) };
         let weights = drawn(&deeper, kind);
@@ -441,8 +441,8 @@ mod tests {
         }
     }
 
-    /// `M` at the start is 1.7 times the identity to a third, a rectangle's to two, whatever the position, where a black box relies
-    /// on its `alpha`.
+    /// Initially `M` is 1.7 times the identity with an error of a third, or of two for a rectangle, whatever the position. For a black box
+    /// it depends on `alpha`.
     #[test]
     fn a_structure_begins_with_a_nearly_constant_mass_matrix() {
         use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -475,7 +475,7 @@ mod tests {
             assert!(gamma.iter().all(|&g| g == -5.0) && weight.iter().all(|&w| w == 0.0));
             assert_eq!(direction.len(), 40 * 2);
             assert!(direction.chunks(2).all(|b| (b[0].hypot(b[1]) - 1.0).abs() < 4.0 * f64::EPSILON));
-            // A mean of 40 unit vectors: each component has the standard error sqrt(1/2/40).
+            // For a mean of 40 unit vectors, each component has the standard error sqrt(1/2/40).
             for i in 0..2 {
                 let mean = direction.iter().skip(i).step_by(2).sum::<f64>() / 40.0;
                 assert!(mean.abs() < 4.0 * (0.5f64 / 40.0).sqrt(), "{mean}");

@@ -141,7 +141,7 @@ impl<'a, S: Scalar> Watcher<'a, S> {
         }))
     }
 
-    /// `true` if the event happens for a motion that was above or below zero.
+    /// Returns `true` if the event counts crossings from this side of zero.
     pub(super) fn catches(&self, event: usize, above: bool) -> bool {
         let Event { falling, rising, .. } = self.events[event];
         if above != self.backwards { falling } else { rising }

@@ -1,5 +1,4 @@
-//! Roll-outs of any length in little memory: samples are handed over in pieces, with the balance of the
-//! energy.
+//! Roll-outs of any length with little memory: samples are delivered in pieces, together with the energy balance.
 
 use super::event::lost;
 use super::force::pieces;
@@ -11,27 +10,27 @@ use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::scalar::{Real, Scalar};
 use std::ops::ControlFlow;
 
-/// End of a roll-out in pieces.
+/// The end of a roll-out in pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending<S> {
-    /// Number of samples handed over, all valid, whatever `stop` says.
+    /// Number of delivered samples, which are all valid, whatever `stop` contains.
     pub samples: usize,
-    /// Work done.
+    /// Counts of steps and evaluations.
     pub statistics: StepCounts,
-    /// Why it ended before `t_end`; none if an event ended it as requested.
+    /// Why it ended before `t_end`; `None` also if an event ended it as requested.
     pub stop: Option<RolloutError>,
-    /// The events that happened, in the order of time.
+    /// The events that happened, ordered by time.
     pub events: Vec<Occurrence<S>>,
-    /// The energy balance of a motion with friction, impacts or a force, if the options request energies. Work and friction are integrated
-    /// along the motion, step by step, whatever the spacing of the samples.
+    /// The energy balance of a motion with friction, impacts or an external force, if the options request energies. Work and friction are
+    /// integrated along the motion, step by step, independently of the samples.
     pub balance: Option<EnergyBalance<S>>,
 }
 
-/// [`rollout`](super::rollout) with the samples handed to `take` in pieces of at most 256, in order, with the energies if the options
-/// request them.
+/// Does the same as [`rollout`](super::rollout), but passes the samples to `take` in pieces of at most 256, in order, with the energies if
+/// the options request them.
 ///
-/// The concatenated pieces are the trajectory of [`rollout`](super::rollout), bit for bit; memory does not grow with their number. When
-/// `take` breaks, the motion ends with [`RolloutError::Stopped`]. A refused motion hands over nothing.
+/// The concatenated pieces equal the trajectory of [`rollout`](super::rollout) bit for bit; memory does not grow with their number. If
+/// `take` breaks, the motion ends with [`RolloutError::Stopped`]. A rejected motion delivers no samples.
 pub fn rollout_in_pieces<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
@@ -42,7 +41,7 @@ pub fn rollout_in_pieces<S: Integrable>(
     hand_over(model, None, (q, v), options, take)
 }
 
-/// As [`rollout_in_pieces`], possibly under an external force.
+/// Does the same as [`rollout_in_pieces`] with an optional external force.
 pub(super) fn hand_over<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -52,7 +51,7 @@ pub(super) fn hand_over<S: Integrable>(
 ) -> Ending<S> {
     let mut piece = Trajectory::empty(model.coordinates());
     let (mut samples, mut willing) = (0, true);
-    // The first, the last and the largest energy of a sample.
+    // The first, the last and the largest energy of the samples.
     let mut energies: Option<[S; 3]> = None;
     let mut give = |piece: &mut Trajectory<S>| {
         piece.energy = options.energy.then(|| piece.energy_by(model));
@@ -92,7 +91,7 @@ pub(super) fn hand_over<S: Integrable>(
     Ending { samples, statistics, stop, events, balance }
 }
 
-/// Work and loss along a motion, integrated at the nodes that its integrator hands over.
+/// Integrates work and loss along a motion, at the quadrature nodes of its integrator.
 struct Exchange<'a, S> {
     model: &'a dyn EulerLagrange<S>,
     force: Option<&'a dyn Force<S>>,
@@ -109,7 +108,7 @@ impl<'a, S: Scalar> Exchange<'a, S> {
         Self { model, force, terms: Terms::default(), external, work: zero, dissipated: zero }
     }
 
-    /// Adds the powers at a time, over `weight` in the unit of time.
+    /// Adds the powers at a time, with a quadrature weight in the unit of time.
     fn add(&mut self, t: S, weight: S, q: &[S], v: &[S]) {
         if !self.model.conserves_energy() {
             let known = self.model.terms_at(&[t], q, v, Request::FORCE, &mut self.terms).is_ok();
@@ -124,32 +123,32 @@ impl<'a, S: Scalar> Exchange<'a, S> {
     }
 }
 
-/// Energy gained, energy lost to friction and impacts, and work of a force from outside between the first and the last sample, in the
-/// unit of `L`.
+/// Energy gained, energy lost to friction and impacts, and work of the external force between the first and the last sample, in the unit of
+/// `L`.
 ///
-/// `dE/dt = v.Q - v.dD/dv` makes the change the work less the friction and the impacts, up to the errors of the integration and of the
+/// Because of `dE/dt = v.Q - v.dD/dv`, the change equals the work minus friction and impacts, up to the errors of integration and
 /// quadrature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyBalance<S> {
-    /// `E` at the end less `E` at the start.
+    /// `E` at the end minus `E` at the start.
     pub change: S,
     /// Integral of the dissipated power `v.dD/dv` over time; 0 for a model that conserves its energy.
     pub dissipated: S,
-    /// Energy that impacts took; 0 where only the samples are known.
+    /// Energy lost in impacts; 0 if only the samples are known.
     pub impacts: S,
-    /// Integral of the power `v.Q` of the force from outside over time; 0 without one.
+    /// Integral of the power `v.Q` of the external force over time; 0 without a force.
     pub work: S,
-    /// Largest `|E|` of a sample: rounding errors are in its units.
+    /// Largest `|E|` of a sample, as a reference for rounding errors.
     pub size: S,
 }
 
 impl<S: Scalar> EnergyBalance<S> {
-    /// Change of the energy that friction, impacts and work do not explain, `change + dissipated + impacts - work`.
+    /// Returns the energy change that friction, impacts and work do not explain, `change + dissipated + impacts - work`.
     pub fn defect(&self) -> S {
         self.change + self.dissipated + self.impacts - self.work
     }
 
-    /// The balance of a motion by `model`, perhaps under a force.
+    /// Computes the energy balance of a motion of `model`, with an optional force.
     pub(super) fn of(
         trajectory: &Trajectory<S>,
         model: &dyn EulerLagrange<S>,
@@ -182,26 +181,27 @@ impl<S: Scalar> EnergyBalance<S> {
 }
 
 impl<S: Scalar> Trajectory<S> {
-    /// Energy balance of the motion by `model`; with an external force use [`Driven::energy_balance`](super::Driven::energy_balance).
+    /// Computes the energy balance of a motion of `model`; with an external force use
+    /// [`Driven::energy_balance`](super::Driven::energy_balance).
     ///
-    /// When a motion is integrated, [`rollout_in_pieces`] gives the balance of its steps. Here the samples are arbitrary, and the power is
-    /// integrated through polynomials of degree 5 through neighbouring samples, at their actual spacing: the error is of order 6 in the
-    /// spacing if the power is smooth. The work of a force is integrated from the force itself along states interpolated in this way,
-    /// between its breaks.
+    /// While a motion is integrated, [`rollout_in_pieces`] computes the balance from its steps. Here only samples are available: the power
+    /// is integrated with polynomials of degree 5 through neighbouring samples, at their actual spacing, so that the error is of order 6 in
+    /// the spacing if the power is smooth. The work of a force is integrated between its breaks, from the force itself at interpolated
+    /// states.
     ///
     /// # Errors
-    /// [`RolloutError::Invalid`] if there is no sample, or a sample at which the model cannot be evaluated.
+    /// [`RolloutError::Invalid`] if there is no sample, or the model cannot be evaluated at a sample.
     pub fn energy_balance(&self, model: &dyn EulerLagrange<S>) -> Result<EnergyBalance<S>, RolloutError> {
         EnergyBalance::of(self, model, None)
     }
 }
 
-/// Index of the first of `window` samples, among `count`, whose polynomial covers the interval before sample `k`.
+/// Returns the index of the first of `window` samples, among `count`, whose polynomial covers the interval before sample `k`.
 fn stencil(k: usize, count: usize, window: usize) -> usize {
     k.saturating_sub(QUADRATURE_SAMPLES / 2).min(count - window)
 }
 
-/// Integral of `v.Q` along the samples.
+/// Computes the integral of `v.Q` along the samples.
 fn work<S: Scalar>(trajectory: &Trajectory<S>, force: &dyn Force<S>) -> S {
     let Trajectory { coordinates: n, t, q, v, .. } = trajectory;
     let (n, zero) = (*n, <S as Real>::zero());
@@ -236,7 +236,7 @@ fn work<S: Scalar>(trajectory: &Trajectory<S>, force: &dyn Force<S>) -> S {
     sum
 }
 
-/// The breaks, in ascending order, that may lie in the interval between two times.
+/// Returns the breaks, in ascending order, that may lie in the interval between two times.
 fn near<S: Scalar>(breaks: &[S], a: S, b: S) -> &[S] {
     let (low, high) = (S::min(a, b), S::max(a, b));
     let first = breaks.partition_point(|t| *t < low);
@@ -244,7 +244,7 @@ fn near<S: Scalar>(breaks: &[S], a: S, b: S) -> &[S] {
     &breaks[first.min(end)..end]
 }
 
-/// Integral of samples `y` over the times `t`, in order: each interval by the polynomial through the samples around it.
+/// Integrates samples `y` over the ascending times `t`, each interval with the polynomial through the samples around it.
 fn integral<S: Scalar>(t: &[S], y: &[S]) -> S {
     let Tableau { nodes, weights, .. } = Tableau::<S>::new(QUADRATURE_SAMPLES / 2);
     let window = QUADRATURE_SAMPLES.min(t.len());
@@ -273,7 +273,7 @@ mod tests {
         build("harmonic-oscillator", &[]).unwrap()
     }
 
-    /// All pieces as one trajectory, at most `most` of them, their number, and how it ended.
+    /// Joins at most `most` pieces to one trajectory; returns it, the number of pieces, and how the motion ended.
     fn joined(
         model: &dyn EulerLagrange<f64>,
         options: &RolloutOptions<f64>,

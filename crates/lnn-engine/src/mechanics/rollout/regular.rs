@@ -1,5 +1,5 @@
-//! Constraints along a motion: where a row vanishes or becomes dependent on the others, a second branch begins, and the equations do not
-//! determine which of the two the motion takes.
+//! Detects branches of constraints along a motion: where a row vanishes or becomes dependent on the others, a second branch begins, and the
+//! equations do not determine which one the motion follows.
 
 use super::StepFailure;
 use super::dense::cubic;
@@ -12,22 +12,22 @@ use crate::linalg::{Workspace, eigh};
 use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
 
-/// What is known about the rows up to the last step.
+/// Data about the constraint rows up to the last step.
 pub(super) struct Regularity<'a, S> {
     manifold: &'a dyn Manifold<S>,
     /// 1, or -1 for a motion backwards in time.
     direction: S,
-    /// Largest length of every row, and the largest of the smallest singular values of the rows in these units.
+    /// Largest length of every row so far, and the largest value so far of the smallest singular value of the rows in these units.
     sizes: Vec<S>,
     largest: S,
     /// State and rows at the end of the last step.
     q: Vec<S>,
     v: Vec<S>,
     matrix: Vec<S>,
-    /// Offsets of the rows in the matrix, and the end of the last one.
+    /// Offsets of the rows in the matrix, with the total number last.
     starts: Vec<usize>,
     rows: ManifoldRows<S>,
-    /// Programs that use the pattern of the rows; the matrix then holds only the nonzero elements.
+    /// Sparse programs of the rows; the matrix then contains only the nonzero elements.
     sparse: Option<Sparse<S>>,
 }
 
@@ -39,7 +39,7 @@ struct Sparse<S> {
 }
 
 impl<'a, S: Scalar> Regularity<'a, S> {
-    /// At the start of a motion.
+    /// Creates the data at the start of a motion.
     pub fn new(manifold: &'a dyn Manifold<S>, (q, v): (&[S], &[S]), backwards: bool) -> Self {
         let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
         let m = manifold.names().len();
@@ -71,11 +71,11 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         known
     }
 
-    /// The rows: all of their elements, or only the nonzero ones.
+    /// Returns all elements of the rows, or only the nonzero ones.
     fn matrix_at(&mut self, q: &[S]) -> Vec<S> {
         if let Some(sparse) = &mut self.sparse {
             let mut matrix = vec![S::nan(); self.starts.last().copied().unwrap_or(0)];
-            // Fields of these sizes cannot fail.
+            // Fields of the right sizes cannot fail.
             let _ = sparse.elements.evaluate(1, &[q, &self.v], &[], &mut [&mut matrix]);
             return matrix;
         }
@@ -90,13 +90,13 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         }
     }
 
-    /// Reciprocals of the sizes.
+    /// Returns the reciprocals of the sizes.
     fn units(&self) -> Vec<S> {
         let zero = <S as Real>::zero();
         self.sizes.iter().map(|&size| if size > zero { size.recip() } else { zero }).collect()
     }
 
-    /// `true` if the smallest singular value of the rows over their sizes exceeds a positive number, by the pattern.
+    /// Returns `true` if the smallest singular value of the scaled rows exceeds a positive number, using the sparse programs.
     fn is_above(&mut self, value: S, q: &[S]) -> bool {
         let units = self.units();
         let Some(Sparse { shifted, pivots, .. }) = &mut self.sparse else { return false };
@@ -105,12 +105,12 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         done.is_ok() && pivots.iter().all(|&pivot| pivot > <S as Real>::zero())
     }
 
-    /// The smallest singular value of the rows over their sizes, if it exceeds a number, by this many halvings; `NaN` for rows that are not
-    /// finite.
+    /// Determines the smallest singular value of the scaled rows by bisection with this many halvings, if it exceeds a number; `NaN` for
+    /// rows that are not finite.
     fn halved(&mut self, (above, halvings): (S, usize), q: &[S]) -> S {
         let matrix = self.matrix_at(q);
         let rows = self.starts.windows(2).map(|at| &matrix[at[0]..at[1]]).zip(self.units());
-        // The smallest singular value is not above the length of any row.
+        // The smallest singular value is at most the length of any row.
         let shortest = rows.fold(S::infinity(), |least, (row, unit)| {
             let size = Real::sqrt(dot(row, row)) * unit;
             if size < least || size.is_nan() { size } else { least }
@@ -126,7 +126,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         low
     }
 
-    /// The smallest singular value of the rows over their sizes.
+    /// Computes the smallest singular value of the scaled rows.
     fn least(&mut self, q: &[S]) -> S {
         match self.sparse {
             Some(_) => self.halved((<S as Real>::zero(), EXACT_HALVINGS), q),
@@ -134,7 +134,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         }
     }
 
-    /// The smallest singular value of the rows over their sizes, and the row with the largest component of its direction.
+    /// Computes the smallest singular value of the scaled rows, and the index of the row with the largest component in its singular vector.
     fn least_direction(&mut self, q: &[S]) -> (S, usize) {
         self.manifold.rows(q, &self.v, &mut self.rows);
         let (n, m, zero) = (self.q.len(), self.sizes.len(), <S as Real>::zero());
@@ -149,10 +149,10 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         (Real::sqrt(S::max(squares.first().copied().unwrap_or(zero), zero)), most)
     }
 
-    /// Examines a step of length `h` by the state at its end.
+    /// Checks a step of length `h`, given the state at its end.
     ///
     /// # Errors
-    /// [`StepFailure::Branch`] if the rows were not regular within the step.
+    /// [`StepFailure::Branch`] if the rows become dependent within the step.
     pub fn step(&mut self, h: S, q: &[S], v: &[S]) -> Result<(), StepFailure> {
         let matrix = self.matrix_at(q);
         let starts = self.starts.clone();
@@ -170,7 +170,7 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         }
         turned |= turns(&last, &matrix);
         let floor = S::of_f64(SUSPICIOUS_SINGULAR_VALUE) * self.largest;
-        // With the pattern it suffices to know whether the value exceeds others.
+        // With sparse programs, it is sufficient to compare the singular value with bounds.
         let (is_low, value) = if self.sparse.is_none() {
             let value = self.least(q);
             (value < floor, value)
@@ -190,13 +190,13 @@ impl<'a, S: Scalar> Regularity<'a, S> {
         Ok(())
     }
 
-    /// Coordinates at the share `x` of a step of length `h` that ends at `(q, v)`, by Hermite's polynomial.
+    /// Returns the coordinates at the fraction `x` of a step of length `h` that ends at `(q, v)`, by Hermite interpolation.
     fn place(&self, x: f64, h: S, q: &[S], v: &[S]) -> Vec<S> {
         let at = |i: usize| cubic(S::of_f64(x), h * self.direction, [self.q[i], self.v[i], q[i], v[i]]);
         (0..q.len()).map(at).collect()
     }
 
-    /// Searches a step for the smallest singular value.
+    /// Minimizes the smallest singular value within a step.
     fn search_step(&mut self, h: S, q: &[S], v: &[S]) -> Result<(), StepFailure> {
         let signed = h * self.direction;
         let mut at = |x: f64| {
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn a_short_step_is_regular_and_one_through_a_branch_is_not() {
-        // Four bars in a line have two ways to go.
+        // When the four bars are in a line, the linkage can continue in two ways.
         let model: Box<dyn EulerLagrange<f64>> =
             build("four-bar-linkage", &[("b".to_string(), "3".to_string()), ("c".to_string(), "1".to_string())])
                 .unwrap();

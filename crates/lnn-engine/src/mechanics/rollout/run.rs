@@ -1,4 +1,4 @@
-//! Roll-outs of one start and of many.
+//! Roll-outs of a single motion.
 
 use super::error::UnderflowCause;
 use super::fixed::Stepper;
@@ -10,29 +10,29 @@ use super::{
 use crate::lagrangian::{EulerLagrange, ManifoldRows, MechanicsError, OffManifold, project};
 use crate::scalar::Scalar;
 
-/// Result of a roll-out.
+/// The result of a roll-out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rollout<S> {
-    /// The samples reached; all valid, whatever `stop` says.
+    /// The samples up to the end, which are all valid, whatever `stop` contains.
     pub trajectory: Trajectory<S>,
-    /// Work done.
+    /// Counts of steps and evaluations.
     pub statistics: StepCounts,
-    /// Why it ended before `t_end`; none if an event ended it as requested.
+    /// Why it ended before `t_end`; `None` also if an event ended it as requested.
     pub stop: Option<RolloutError>,
-    /// The events that happened, in the order of time.
+    /// The events that happened, ordered by time.
     pub events: Vec<Occurrence<S>>,
 }
 
 impl<S: Scalar> Rollout<S> {
-    /// `true` if `t_end` was reached, or an event that ends the motion.
+    /// Returns `true` if the motion reached `t_end`, or an event that ends it.
     pub fn is_complete(&self) -> bool {
         self.stop.is_none()
     }
 
-    /// The trajectory if `t_end` was reached.
+    /// Returns the trajectory if `t_end` was reached.
     ///
     /// # Errors
-    /// The reason if not.
+    /// The reason if it was not.
     pub fn complete(self) -> Result<Trajectory<S>, RolloutError> {
         match self.stop {
             None => Ok(self.trajectory),
@@ -41,7 +41,7 @@ impl<S: Scalar> Rollout<S> {
     }
 }
 
-/// Roll-outs as a method of every model.
+/// Provides roll-outs as a method of every model.
 ///
 /// ```
 /// use lnn::prelude::*;
@@ -53,11 +53,11 @@ impl<S: Scalar> Rollout<S> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Motion<S: Integrable>: EulerLagrange<S> {
-    /// The motion from `(q, v)` at time 0, sampled every `dt` until `t_end`, by the adaptive method of [`RolloutOptions::new`] with its
-    /// tolerances; [`rollout`] takes other options and keeps what was reached before a failure.
+    /// Integrates from `(q, v)` at time 0 and samples the motion every `dt` until `t_end`, with the adaptive method and tolerances of
+    /// [`RolloutOptions::new`]. Use [`rollout`] to set other options or to keep the samples before a failure.
     ///
     /// # Errors
-    /// The reason for which the motion ended before `t_end`.
+    /// The reason why the motion ended before `t_end`.
     fn rollout(&self, q: &[S], v: &[S], t_end: S, dt: S) -> Result<Trajectory<S>, RolloutError>;
 }
 
@@ -69,9 +69,8 @@ impl<S: Integrable, M: EulerLagrange<S>> Motion<S> for M {
 
 /// Integrates `dq/dt = v`, `dv/dt = a(q, v)` from `(q, v)` at `options.t0` and samples it at `t0 + k dt` and `t_end`.
 ///
-/// `q` and `v` have length `n` and are in physical units. The domain is checked at every state that is evaluated, the
-/// trial states of a step included; a step that would leave it is shortened, so that the time reported is the time of
-/// the exit.
+/// `q` and `v` have length `n` and are in physical units. The domain is checked at every evaluated state, including the trial states of a
+/// step. A step that would leave the domain is shortened, so that the reported time is the time of the exit.
 ///
 /// Fixed-step methods check the domain at the stages and the end of every step, and report the last time inside.
 pub fn rollout<S: Integrable>(
@@ -83,7 +82,7 @@ pub fn rollout<S: Integrable>(
     adaptive_or_fixed(model, None, q, v, options)
 }
 
-/// [`rollout`] by the structure-preserving methods only, in every precision, including [`crate::scalar::Dd`].
+/// Does the same as [`rollout`] for the structure-preserving methods, in every precision, including [`crate::scalar::Dd`].
 pub fn rollout_fixed<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     q: &[S],
@@ -93,7 +92,7 @@ pub fn rollout_fixed<S: Scalar>(
     fixed(model, None, q, v, options)
 }
 
-/// Integrates by any method, possibly under an external force.
+/// Integrates with any method and an optional external force.
 pub(super) fn adaptive_or_fixed<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -104,7 +103,7 @@ pub(super) fn adaptive_or_fixed<S: Integrable>(
     collected(model, options, |keep, events| S::roll_out(model, force, (q, v), options, (keep, None, events)))
 }
 
-/// Integrates by the structure-preserving methods, possibly under an external force.
+/// Integrates with the structure-preserving methods and an optional external force.
 pub(super) fn fixed<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -115,7 +114,7 @@ pub(super) fn fixed<S: Scalar>(
     collected(model, options, |keep, events| integrate_fixed(model, force, (q, v), options, (keep, None, events)))
 }
 
-/// The samples of a motion as a trajectory, with the energies if the options request them.
+/// Collects the samples of a motion in a trajectory, with the energies if the options request them.
 fn collected<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     options: &RolloutOptions<S>,
@@ -133,7 +132,7 @@ fn collected<S: Scalar>(
     Rollout { trajectory, statistics, stop, events }
 }
 
-/// Integrates by any method and passes on every sample and, if requested, every node, without storing them.
+/// Integrates with any method and passes every sample and, if requested, every quadrature node to the receivers without storing them.
 pub(super) fn integrate<S: Integrable>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -155,7 +154,7 @@ pub(super) fn integrate<S: Integrable>(
     }
 }
 
-/// Integrates by the structure-preserving methods and passes on every sample, without storing them.
+/// Integrates with the structure-preserving methods and passes every sample to the receivers without storing them.
 fn integrate_fixed<S: Scalar>(
     model: &dyn EulerLagrange<S>,
     force: Option<&dyn Force<S>>,
@@ -184,10 +183,10 @@ fn integrate_fixed<S: Scalar>(
     fixed::run(model, force, &mut stepper, (&q, &v), options, receivers)
 }
 
-/// The start, projected onto the constraints of the model.
+/// Returns the initial state, projected onto the constraints of the model.
 ///
 /// # Errors
-/// [`RolloutError::OffConstraints`] for a start that is not close to them.
+/// [`RolloutError::OffConstraints`] for an initial state that is not close to them.
 fn allowed<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) -> Result<(Vec<S>, Vec<S>), RolloutError> {
     let (mut on_q, mut on_v) = (q.to_vec(), v.to_vec());
     let Some(manifold) = model.manifold() else { return Ok((on_q, on_v)) };
@@ -226,7 +225,7 @@ fn check<S: Scalar>(n: usize, q: &[S], v: &[S], options: &RolloutOptions<S>) -> 
     options.check(n)
 }
 
-/// Rejects a purely absolute tolerance that is finer than the scalar can resolve at the start.
+/// Rejects a purely absolute tolerance that is below the resolution of the scalar at the start.
 fn reachable<S: Scalar>(q: &[S], v: &[S], options: &RolloutOptions<S>) -> Result<(), RolloutError> {
     let zero = S::of_f64(0.0);
     let size = q.iter().chain(v).fold(zero, |size, x| S::max(size, x.abs()));
@@ -242,7 +241,7 @@ fn reachable<S: Scalar>(q: &[S], v: &[S], options: &RolloutOptions<S>) -> Result
     Err(RolloutError::Invalid { what: "atol", problem })
 }
 
-/// Why a derivative or a step could not be computed.
+/// The reason why a derivative or a step could not be computed.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum StepFailure {
     Domain {
@@ -257,9 +256,9 @@ pub(super) enum StepFailure {
         iterations: usize,
         residual: f64,
     },
-    /// No state on the constraints is close.
+    /// No nearby state satisfies the constraints.
     OffConstraints,
-    /// The rows of the constraints are not independent so long after the last state.
+    /// The constraint rows are dependent at this time after the last state.
     Branch {
         constraint: usize,
         ahead: f64,
@@ -267,7 +266,7 @@ pub(super) enum StepFailure {
 }
 
 impl StepFailure {
-    /// A state `(q, v)` that must be finite and inside the domain.
+    /// Checks that a state `(q, v)` is finite and inside the domain.
     pub(super) fn check<S: Scalar>(domain: Option<&super::Domain<S>>, state: &[S]) -> Result<(), Self> {
         if state.iter().any(|x| !x.is_finite()) {
             return Err(Self::State);
@@ -282,16 +281,16 @@ impl StepFailure {
     }
 }
 
-/// Receives the time, coordinates and velocities of every sample in order, and says whether to continue.
+/// Receives the time, coordinates and velocities of every sample in order, and returns whether to continue.
 pub(super) type Keep<'a, S> = dyn FnMut(S, &[S], &[S]) -> bool + 'a;
 
-/// Receives time, weight, coordinates and velocities at the nodes of a quadrature over time along a motion, in addition to the samples.
+/// Receives time, weight, coordinates and velocities at quadrature nodes along a motion, in addition to the samples.
 pub(super) type Nodes<'a, S> = dyn FnMut(S, S, &[S], &[S]) + 'a;
 
-/// Receivers of the samples, the nodes if requested, and the events.
+/// Receivers of the samples, of the nodes if requested, and of the events.
 pub(super) type Receivers<'r, 'a, S> = (&'r mut Keep<'a, S>, Option<&'r mut Nodes<'a, S>>, &'r mut Vec<Occurrence<S>>);
 
-/// The error of a motion that ended with a failed step.
+/// Returns the error for a motion that ended with a failed step.
 pub(super) fn into_error(failure: StepFailure, t: f64, state: Vec<f64>, step: f64) -> RolloutError {
     match failure {
         StepFailure::Domain { component, value, lower, upper } => {

@@ -1,4 +1,4 @@
-//! Newton's method with a matrix that is kept as long as it converges, iterated to the rounding floor.
+//! Simplified Newton method, which keeps its matrix as long as it converges and iterates down to rounding errors.
 
 use super::StepFailure;
 use super::phase::{Defect, PhaseSpace, singular};
@@ -6,32 +6,33 @@ use super::thresholds::{MOST_NEWTON_ITERATIONS, MOST_NEWTON_MATRICES, NEWTON_PAT
 use crate::linalg::{LANES, solve};
 use crate::scalar::{Real, Scalar};
 
-/// Equations `F(x) = 0` of one step.
+/// The equations `F(x) = 0` of one step.
 pub(super) trait Equations<S: Scalar> {
-    /// `F(x)` into `residual`, and how large it is.
+    /// Writes `F(x)` to `residual`, and returns its size.
     fn residual(
         &mut self,
         phase: &mut PhaseSpace<'_, S>,
         x: &[S],
         residual: &mut [S],
     ) -> Result<Defect<S>, StepFailure>;
-    /// An approximation of `dF/dx` at `x`, row-major.
+    /// Writes an approximation of `dF/dx` at `x`, row-major.
     fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure>;
-    /// The change of unknown `i` caused by rounding of the equations' inputs, including the coordinates; the force of a stiff spring is not
-    /// known more precisely.
+    /// Returns the change of unknown `i` caused by rounding of the inputs of the equations, including the coordinates: the force of a stiff
+    /// spring has no higher accuracy.
     fn rounding(&self, n: usize, x: &[S], i: usize) -> S;
 }
 
-/// The change of velocities that are unknown at `x` which the roundings of them and of coordinates `q`, over a step `h`, explain.
+/// Returns the change of an unknown velocity in `x` that follows from rounding of the velocities and of the coordinates `q`, over a step
+/// `h`.
 pub(super) fn rounding<S: Scalar>(q: &[S], h: S, x: &[S], i: usize) -> S {
     S::epsilon() * (x[i].abs() + q[i % q.len()].abs() / h.abs())
 }
 
-/// The inverse of an iteration matrix and how well it did.
+/// The inverse of an iteration matrix and a measure of its convergence.
 #[derive(Clone, Debug)]
 pub(super) struct SimplifiedNewton<S> {
     inverse: Vec<S>,
-    /// Fewest evaluations a step took with this matrix.
+    /// Smallest number of evaluations in a step with this matrix.
     least: usize,
     stale: bool,
     residual: Vec<S>,
@@ -40,7 +41,7 @@ pub(super) struct SimplifiedNewton<S> {
 }
 
 impl<S: Scalar> SimplifiedNewton<S> {
-    /// Without a matrix, for `size` unknowns.
+    /// Creates a solver for `size` unknowns, without a matrix.
     pub(super) fn new(size: usize) -> Self {
         let zero = <S as Real>::zero();
         Self {
@@ -53,15 +54,15 @@ impl<S: Scalar> SimplifiedNewton<S> {
         }
     }
 
-    /// Forgets the matrix, for another step size or place.
+    /// Discards the matrix, for another step size or position.
     pub(super) fn forget(&mut self) {
         self.stale = true;
     }
 
-    /// Solves from the guess in `x`; on success the last call of [`Equations::residual`] was at the solution.
+    /// Solves the equations, starting from the guess in `x`; on success the last call of [`Equations::residual`] was at the solution.
     ///
-    /// The iteration ends when it no longer halves the residual and the residual, or its correction, is at rounding level. It does not end
-    /// at a tolerance, which would leave errors of one sign that drift (Hairer, McLachlan and Razakarivony 2008).
+    /// The iteration ends when it no longer halves the residual, and the residual or its correction is at the level of rounding. It does
+    /// not end at a tolerance, because that would leave errors of one sign, which cause a drift (Hairer, McLachlan and Razakarivony 2008).
     ///
     /// # Errors
     /// Those of the equations; [`StepFailure::NotConverged`]; a singular matrix.
@@ -103,18 +104,19 @@ impl<S: Scalar> SimplifiedNewton<S> {
         Ok(())
     }
 
-    /// The correction of unknown `i` for the residual.
+    /// Returns the correction of unknown `i` for the residual.
     fn correction(&self, i: usize) -> S {
         let row = &self.inverse[i * self.residual.len()..][..self.residual.len()];
         row.iter().zip(&self.residual).fold(<S as Real>::zero(), |sum, (&a, &r)| a.mul_add(r, sum))
     }
 
-    /// `true` if the residual, however large relative to cancelling terms, only requires corrections within the rounding of the unknowns.
+    /// Returns `true` if the correction for the residual is below the rounding of the unknowns, however large the residual is relative to
+    /// cancelling terms.
     fn is_settled(&self, n: usize, equations: &impl Equations<S>, x: &[S]) -> bool {
         (0..x.len()).all(|i| self.correction(i).abs() <= S::of_f64(NEWTON_ROUNDINGS) * equations.rounding(n, x, i))
     }
 
-    /// A new matrix at `x`, inverted.
+    /// Computes and inverts a new matrix at `x`.
     fn refresh(
         &mut self,
         phase: &mut PhaseSpace<'_, S>,
@@ -133,7 +135,7 @@ impl<S: Scalar> SimplifiedNewton<S> {
             }
             self.inverse[0] = self.matrix[0].recip();
         } else {
-            // Columns of the inverse, a block of lanes at a time.
+            // Columns of the inverse, one block of lanes at a time.
             let width = size.min(LANES);
             let matrices = self.matrix.repeat(width);
             let mut columns = vec![<S as Real>::zero(); width * size];

@@ -1,4 +1,4 @@
-//! Gauss collocation under constraints: multipliers at the Lobatto nodes keep the motion on `phi(q) = 0`.
+//! Gauss collocation with constraints: multipliers at the Lobatto nodes enforce `phi(q) = 0`.
 //!
 //! With stage velocities `V_i`, `Q_i = q + h sum_j a_ij V_j` at the nodes of Gauss and `R_k = q + h sum_j c_kj V_j` at those of Lobatto, `k
 //! = 0..s`, where the first is the start of the step and the last its end,
@@ -22,7 +22,7 @@ use super::simplified_newton::{Equations, SimplifiedNewton, rounding};
 use crate::lagrangian::{Manifold, ManifoldRows};
 use crate::scalar::{Real, Scalar};
 
-/// The nodes of Lobatto that go with a tableau of Gauss.
+/// The Lobatto nodes that belong to a Gauss tableau.
 #[derive(Clone, Debug)]
 struct Lobatto<S> {
     /// `w`, `(s + 1)`.
@@ -45,7 +45,7 @@ impl<S: Scalar> Lobatto<S> {
                 (vec![zero, half - x, half + x, one], [1, 5, 5, 1].map(|w| Real::ratio(w, 12)).to_vec())
             }
         };
-        // Integrals of Lagrange's polynomials from 0 to each node, by the quadrature itself.
+        // Integrals of the Lagrange polynomials from 0 to each node, computed with the quadrature.
         let mut positions = Vec::with_capacity((s + 1) * s);
         for &end in &nodes {
             let at: Vec<S> = gauss.nodes.iter().map(|&c| c * end).collect();
@@ -62,7 +62,7 @@ impl<S: Scalar> Lobatto<S> {
     }
 }
 
-/// The equations of one step, and the results of their last evaluation.
+/// The equations of one step, and the results of the last evaluation.
 struct Stages<'a, S: Scalar> {
     tableau: &'a Tableau<S>,
     lobatto: &'a Lobatto<S>,
@@ -73,14 +73,14 @@ struct Stages<'a, S: Scalar> {
     buffers: &'a mut Buffers<S>,
 }
 
-/// Which rows are functions of the coordinates, and which linear in the velocities.
+/// The indices of holonomic rows, and of rows that are linear in the velocities.
 #[derive(Clone, Debug)]
 struct Kinds {
     holonomic: Vec<usize>,
     linear: Vec<usize>,
 }
 
-/// Numbers of the last evaluation.
+/// Results of the last evaluation.
 #[derive(Clone, Debug)]
 struct Buffers<S> {
     /// `h c_j`.
@@ -89,19 +89,19 @@ struct Buffers<S> {
     q: Vec<S>,
     p: Vec<S>,
     g: Vec<S>,
-    /// Change of the momentum by forces and constraints over the step but the last impulse, `(n)`.
+    /// Change of the momentum by forces and constraints over the step, except for the last impulse, `(n)`.
     push: Vec<S>,
-    /// Sizes of the terms of the constraints' equations.
+    /// Sizes of the terms in the constraint equations.
     sizes: Vec<S>,
 }
 
-/// `from[row]` of an `(m, n)` matrix.
+/// Returns row `row` of an `(m, n)` matrix.
 fn row_of<S>(matrix: &[S], n: usize, row: usize) -> &[S] {
     &matrix[row * n..(row + 1) * n]
 }
 
 impl<S: Scalar> Stages<'_, S> {
-    /// `q + h sum_j weights_j V_j`.
+    /// Computes `q + h sum_j weights_j V_j`.
     fn place(&self, n: usize, weights: &[S], v: &[S]) -> Vec<S> {
         let q = &self.state.q;
         (0..n)
@@ -112,12 +112,12 @@ impl<S: Scalar> Stages<'_, S> {
             .collect()
     }
 
-    /// `h a_ij` without `h`.
+    /// Returns `a_ij`, without the factor `h`.
     fn ratio(&self, i: usize, j: usize) -> S {
         self.tableau.ratios[i * self.tableau.nodes.len() + j] * self.tableau.weights[j]
     }
 
-    /// Adds the equations `phi(R_k) = 0`, and their impulses at the nodes of Lobatto but the last.
+    /// Adds the equations `phi(R_k) = 0`, and their impulses at all Lobatto nodes except the last one.
     fn add_holonomic(&self, n: usize, v: &[S], impulses: &[S], sums: &mut Sums<S>) {
         let (s, held, zero, h) = (self.tableau.nodes.len(), self.kinds.holonomic.len(), <S as Real>::zero(), self.h);
         for k in (0..=s).filter(|_| held > 0) {
@@ -142,7 +142,7 @@ impl<S: Scalar> Stages<'_, S> {
         }
     }
 
-    /// Adds the forces at the nodes of Gauss, and there the rows that are linear in the velocities with their multipliers.
+    /// Adds the forces at the Gauss nodes, and the rows that are linear in the velocities with their multipliers.
     fn add_forces(&self, n: usize, v: &[S], multipliers: &[S], sums: &mut Sums<S>) {
         let (zero, h, linear) = (<S as Real>::zero(), self.h, &self.kinds.linear);
         for j in 0..self.tableau.nodes.len() {
@@ -162,14 +162,14 @@ impl<S: Scalar> Stages<'_, S> {
     }
 }
 
-/// Sums over the nodes of one evaluation.
+/// Sums over the nodes in one evaluation.
 struct Sums<S> {
     /// Contribution of the current node, `(n)`.
     node: Vec<S>,
     /// Change of the momenta of the stages, `(stages, n)`, and of the end without the last impulse, `(n)`.
     stages: Vec<S>,
     end: Vec<S>,
-    /// Defects of the constraints' equations, and the sizes of their terms.
+    /// Defects of the constraint equations, and the sizes of their terms.
     defects: Vec<S>,
     sizes: Vec<S>,
     rows: ManifoldRows<S>,
@@ -188,7 +188,7 @@ impl<S: Scalar> Sums<S> {
         }
     }
 
-    /// Adds the contribution of the current node to every stage by its weight, and to the end by another.
+    /// Adds the contribution of the current node to every stage and to the end of the step, with the given weights.
     fn spread(&mut self, n: usize, of_stage: impl Fn(usize) -> S, of_end: S) {
         for (i, stage) in self.stages.chunks_exact_mut(n).enumerate() {
             let weight = of_stage(i);
@@ -229,14 +229,14 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         let size = |k: usize| p0.high[k].abs() + most(found, k) + self.h.abs() * most(forces, k) + most(&wanted, k);
         let of_momenta = Defect::of(n, &residual[..s * n], size);
         residual[s * n..].copy_from_slice(&defects);
-        // The equations of constraints consist of velocities.
+        // The terms of the constraint equations are proportional to velocities.
         let speed = v.iter().fold(zero, |most, v| S::max(most, v.abs()));
         let of_rows = Defect::of(defects.len().max(1), &defects, |i| sizes.get(i).map_or(zero, |&size| size + speed));
         (self.buffers.push, self.buffers.sizes) = (end, sizes);
         Ok(of_momenta.worst(of_rows))
     }
 
-    /// By forward differences, which suffice for an iteration matrix.
+    /// Uses forward differences, which are sufficient for an iteration matrix.
     fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
         let (size, n, s) = (x.len(), phase.n, self.tableau.nodes.len());
         let (zero, one) = (<S as Real>::zero(), <S as Real>::one());
@@ -258,14 +258,14 @@ impl<S: Scalar> Equations<S> for Stages<'_, S> {
         Ok(())
     }
 
-    /// The velocities determine the impulses.
+    /// The rounding of the impulses follows from that of the velocities.
     fn rounding(&self, n: usize, x: &[S], i: usize) -> S {
         let velocities = self.tableau.nodes.len() * n;
         if i < velocities { rounding(&self.state.q.high, self.h, x, i) } else { S::infinity() }
     }
 }
 
-/// The integrator with the data that it keeps from step to step.
+/// The integrator with the data stored from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Spark<S> {
     tableau: Tableau<S>,
@@ -278,7 +278,7 @@ pub(super) struct Spark<S> {
 }
 
 impl<S: Scalar> Spark<S> {
-    /// `stages` 1, 2 or 3 on a manifold.
+    /// Creates the method with `stages` 1, 2 or 3 on a manifold.
     pub(super) fn new(stages: usize, manifold: &dyn Manifold<S>) -> Self {
         let tableau = Tableau::new(stages);
         let (n, m, zero) = (manifold.coordinates(), manifold.names().len(), <S as Real>::zero());
@@ -302,7 +302,7 @@ impl<S: Scalar> Spark<S> {
         }
     }
 
-    /// One step of size `h`; `velocity` is close to the velocity at the start before the step, and is that of the end after it.
+    /// Computes one step of size `h`; `velocity` must be close to the velocity at the start, and afterwards equals that at the end.
     pub(super) fn step(
         &mut self,
         phase: &mut PhaseSpace<'_, S>,
@@ -332,7 +332,7 @@ impl<S: Scalar> Spark<S> {
         Ok(())
     }
 
-    /// Coordinates and velocities of the stages of the last step.
+    /// Returns coordinates and velocities of the stages of the last step.
     pub(super) fn stages(&self) -> (&[S], &[S]) {
         (&self.buffers.q, &self.x[..self.buffers.q.len()])
     }
@@ -342,7 +342,7 @@ impl<S: Scalar> Spark<S> {
 mod tests {
     use super::*;
 
-    /// The coefficients of one stage are RATTLE's; all satisfy the condition of symplecticity and the order conditions of the end.
+    /// For one stage the coefficients are those of RATTLE; all satisfy the symplecticity condition and the order conditions of the end.
     #[test]
     fn coefficients_are_those_of_jay() {
         for s in 1..=3 {

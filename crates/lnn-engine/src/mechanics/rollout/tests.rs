@@ -1,4 +1,4 @@
-//! Roll-outs against exact motions, and every way to fail.
+//! Compares roll-outs with exact motions, and tests every kind of failure.
 
 use super::models::{BROKEN, EXPLODING, FOUR, KEPLER, OSCILLATOR, PENDULUM, SINGULAR};
 use super::*;
@@ -48,7 +48,7 @@ fn error_follows_tolerance() {
             let tolerance = 10.0_f64.powi(-exponent);
             let done = rollout(&OSCILLATOR, &[1.0], &[0.0], &options(method, 20.0, 0.05, tolerance));
             let error = oscillator_error(&done.trajectory, 0.0);
-            // Every sample, interpolated ones included.
+            // This includes interpolated samples.
             assert!(error < 100.0 * tolerance, "{method:?} {tolerance:e}: {error:e}");
             assert!(error < last, "{method:?} {tolerance:e}: {error:e} after {last:e}");
             last = error;
@@ -87,7 +87,7 @@ fn energy_is_kept_and_angles_stay_continuous() {
 
 #[test]
 fn kepler_returns_after_ten_turns() {
-    // Eccentricity 0.5 from the pericentre: period 2 pi.
+    // The eccentricity is 0.5 and the motion starts at the pericentre; the period is 2 pi.
     let (q, v) = ([0.5, 0.0], [0.0, 3.0_f64.sqrt()]);
     let turn = 2.0 * std::f64::consts::PI;
     let done = rollout(&KEPLER, &q, &v, &RolloutOptions::<f64>::reference(10.0 * turn, turn)).complete().unwrap();
@@ -95,8 +95,8 @@ fn kepler_returns_after_ten_turns() {
     for k in 0..done.len() {
         let (qk, vk) = done.state(k);
         let error = (qk[0] - q[0]).abs() + (qk[1] - q[1]).abs() + (vk[0] - v[0]).abs() + (vk[1] - v[1]).abs();
-        // An energy error of 5e-12 per turn is amplified by 3 pi / |E| into a delay and by |v| + |a| at the pericentre
-        // into 100 times as much, and grows with the square of the turns.
+        // An energy error of 5e-12 per turn is amplified by 3 pi / |E| into a delay and by |v| + |a| at the pericentre into an error 100
+        // times as large, which grows with the square of the number of turns.
         assert!(error <= 5e-10 * (k * k) as f64, "turn {k}: {error:e}");
     }
 }
@@ -176,7 +176,7 @@ fn failures_in_single_precision_end_soon() {
 
 #[test]
 fn a_bound_that_only_trial_states_cross_is_no_failure() {
-    // The oscillator stays within [-1, 1]; trial states of long steps do not.
+    // The oscillator stays within [-1, 1], but trial states of long steps do not.
     let domain = Some(Domain::new(vec![Some((-1.0 - 1e-6, 1.0 + 1e-6)), None]));
     for method in METHODS {
         let done = rollout(
@@ -242,7 +242,7 @@ fn ensembles_do_not_depend_on_threads() {
 
 const FIXED: [Integrator; 4] = [Integrator::Midpoint, Integrator::Gauss4, Integrator::Gauss6, Integrator::Variational];
 
-/// A longest step beyond the distance of samples is that distance.
+/// Tests that a longest step above the sampling interval is reduced to that interval.
 fn long_steps_are_cut<S: crate::scalar::Scalar>(model: &dyn EulerLagrange<S>) {
     let number = S::of_f64;
     for method in FIXED {
@@ -278,7 +278,7 @@ fn tolerances_that_cannot_be_kept_are_refused_with_the_least() {
         assert_eq!(refusal(1e-16, 1.0), "rtol: 1e-16 is finer than f64 can keep, the least is 2e-15");
         let alone = "atol: 1e-30 without rtol is finer than f64 can keep of a state of size 2, the least is 4e-15";
         assert_eq!(refusal(0.0, 1e-30), alone);
-        // The least works, alone or together.
+        // The smallest tolerance works, alone or together with the other.
         let least = RolloutOptions::<f64>::least_tolerance();
         for (rtol, atol) in [(least, least), (least, 0.0), (0.0, 2.0 * least)] {
             let done = run(method, rtol, atol);
@@ -291,7 +291,7 @@ fn tolerances_that_cannot_be_kept_are_refused_with_the_least() {
         let single = RolloutOptions::<f32> { method, rtol: 1e-7, ..RolloutOptions::new(1.0, 0.1) };
         let refusal = rollout(&PENDULUM, &[1.0_f32], &[2.0], &single).stop.unwrap().to_string();
         assert!(refusal.ends_with("than f32 can keep, the least is 1e-6"), "{refusal}");
-        // A coordinate that stays at 0 has no error, whatever the absolute tolerance.
+        // A coordinate that stays 0 has no error, whatever the absolute tolerance.
         let still = RolloutOptions { method, atol: 0.0, ..RolloutOptions::new(1.0, 0.1) };
         let done = rollout(&PENDULUM, &[0.0], &[0.0], &still);
         assert!(done.is_complete() && done.trajectory.q.iter().all(|q| *q == 0.0), "{:?}", done.stop);

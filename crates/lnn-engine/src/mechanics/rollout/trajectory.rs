@@ -1,4 +1,4 @@
-//! Sampled motion, and the times of its samples.
+//! Sampled motion, and the sample times.
 
 use super::RolloutError;
 use super::options::{RolloutOptions, blur};
@@ -8,12 +8,12 @@ use crate::scalar::{Real, Scalar};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 
-/// Counts of an integration.
+/// Counts of steps and evaluations in an integration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepCounts {
     /// Steps taken.
     pub accepted: usize,
-    /// Steps attempted and not taken.
+    /// Steps attempted but rejected.
     pub rejected: usize,
     /// States evaluated: accelerations for the adaptive methods, momenta and forces for the structure-preserving ones.
     pub evaluations: usize,
@@ -38,38 +38,38 @@ pub struct Trajectory<S> {
     pub coordinates: usize,
     /// Times.
     pub t: Vec<S>,
-    /// Coordinates, `(len, n)`; angles continuous.
+    /// Coordinates, `(len, n)`; angles are continuous.
     pub q: Vec<S>,
     /// Velocities, `(len, n)`.
     pub v: Vec<S>,
-    /// Energy at each time by the model that moved, if requested; `NaN` where it could not be computed.
+    /// Energy of the integrated model at each time, if requested; `NaN` if it could not be computed.
     pub energy: Option<Vec<S>>,
 }
 
 impl<S: Scalar> Trajectory<S> {
-    /// No states of `n` coordinates.
+    /// Creates a trajectory of `n` coordinates without states.
     pub fn empty(coordinates: usize) -> Self {
         Self { coordinates, t: Vec::new(), q: Vec::new(), v: Vec::new(), energy: None }
     }
 
-    /// Adds a state behind the last.
+    /// Appends a state.
     pub(super) fn push(&mut self, t: S, q: &[S], v: &[S]) {
         self.t.push(t);
         self.q.extend_from_slice(q);
         self.v.extend_from_slice(v);
     }
 
-    /// Number of states.
+    /// Returns the number of states.
     pub fn len(&self) -> usize {
         self.t.len()
     }
 
-    /// `true` if there are no states.
+    /// Returns `true` if there are no states.
     pub fn is_empty(&self) -> bool {
         self.t.is_empty()
     }
 
-    /// State `k` as `(q, v)`.
+    /// Returns state `k` as `(q, v)`.
     ///
     /// # Panics
     /// If `k` is not below [`Trajectory::len`].
@@ -78,7 +78,7 @@ impl<S: Scalar> Trajectory<S> {
         (&self.q[rows.clone()], &self.v[rows])
     }
 
-    /// Energy `E = p.v - L` of `model` at every state; `NaN` where the model cannot evaluate it.
+    /// Computes the energy `E = p.v - L` of `model` at every state; `NaN` if the model cannot be evaluated there.
     pub fn energy_by(&self, model: &dyn EulerLagrange<S>) -> Vec<S> {
         let size = STATES_TOGETHER * self.coordinates.max(1);
         let mut energy = Vec::with_capacity(self.len());
@@ -87,7 +87,7 @@ impl<S: Scalar> Trajectory<S> {
         for ((q, v), t) in states.zip(self.t.chunks(STATES_TOGETHER)) {
             let batch = t.len();
             terms.energy.clear();
-            // A row that is not finite is reported and stays `NaN` or infinite in the result.
+            // The error for a row that is not finite is ignored, since the result shows it as `NaN` or infinite.
             let computed = model.terms_at(t, q, v, Request::ENERGY, &mut terms);
             if terms.energy.len() == batch {
                 energy.extend(terms.energy.iter().map(|&e| if e.is_finite() { e } else { S::nan() }));
@@ -99,7 +99,7 @@ impl<S: Scalar> Trajectory<S> {
         energy
     }
 
-    /// The same states in another precision.
+    /// Converts the states to another precision.
     pub fn cast<T: Scalar>(&self) -> Trajectory<T> {
         let cast = |values: &[S]| values.iter().map(|&x| x.cast()).collect::<Vec<T>>();
         Trajectory {
@@ -111,8 +111,8 @@ impl<S: Scalar> Trajectory<S> {
         }
     }
 
-    /// CSV text with the header `t, columns..` and, if stored, `energy`; full digits, one state per line. Where a column is
-    /// itself called `t`, the time of a spacetime, the first is `tau`.
+    /// Formats the trajectory as CSV with the header `t, columns..` and, if stored, `energy`; with all digits, one state per line. If a
+    /// column is already called `t`, the time of a spacetime, the first column is called `tau`.
     ///
     /// `columns` are the `2n` names of a state, coordinates then velocities.
     ///
@@ -122,10 +122,10 @@ impl<S: Scalar> Trajectory<S> {
         Ok(self.csv_header(columns)? + &self.csv_rows())
     }
 
-    /// The header of [`Trajectory::to_csv`], one line.
+    /// Returns the header of [`Trajectory::to_csv`] as one line.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Trajectory::to_csv`].
     pub fn csv_header<T: AsRef<str>>(&self, columns: &[T]) -> Result<String, RolloutError> {
         let n = self.coordinates;
         if columns.len() != 2 * n {
@@ -144,7 +144,7 @@ impl<S: Scalar> Trajectory<S> {
         Ok(text)
     }
 
-    /// The lines of [`Trajectory::to_csv`] below its header.
+    /// Returns the lines of [`Trajectory::to_csv`] below the header.
     pub fn csv_rows(&self) -> String {
         let mut text = String::new();
         for (k, t) in self.t.iter().enumerate() {
@@ -162,16 +162,16 @@ impl<S: Scalar> Trajectory<S> {
     }
 }
 
-/// A CSV field, in quotes where the format demands them.
+/// Formats a CSV field, with quotes if necessary.
 pub fn quoted(field: &str) -> String {
     if field.contains([',', '"', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.into() }
 }
 
 /// Elapsed times of samples, ascending from 0.
 pub(super) trait Times<S> {
-    /// Number of samples.
+    /// Returns the number of samples.
     fn len(&self) -> usize;
-    /// Elapsed time of sample `k`, if there is one.
+    /// Returns the elapsed time of sample `k`, if it exists.
     fn get(&self, k: usize) -> Option<S>;
 }
 
@@ -185,20 +185,20 @@ impl<S: Copy> Times<S> for Vec<S> {
     }
 }
 
-/// The samples of the options: `t0 + k dt`, and `t_end` as the last.
+/// The sample times from the options: `t0 + k dt`, and `t_end` as the last one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Samples<S> {
     t0: S,
     t_end: S,
-    /// `abs(dt)`, and `dt` with the direction of time.
+    /// `abs(dt)`, and `dt` with the sign of the direction of time.
     step: S,
     signed: S,
-    /// Samples before the last.
+    /// Number of samples before the last one.
     regular: usize,
 }
 
 impl<S: Scalar> Samples<S> {
-    /// Of checked options.
+    /// Computes the sample times of options that are already checked.
     pub(super) fn new(options: &RolloutOptions<S>) -> Self {
         let (t0, t_end) = (options.t0, options.t_end);
         let span = t_end - t0;
@@ -212,19 +212,19 @@ impl<S: Scalar> Samples<S> {
         Self { t0, t_end, step, signed, regular }
     }
 
-    /// Time of sample `k`.
+    /// Returns the time of sample `k`.
     pub(super) fn time(&self, k: usize) -> S {
         if k < self.regular { self.t0 + S::of_f64(k as f64) * self.signed } else { self.t_end }
     }
 
-    /// Elapsed time `abs(t - t0)` of sample `k`.
+    /// Returns the elapsed time `abs(t - t0)` of sample `k`.
     pub(super) fn elapsed(&self, k: usize) -> S {
         if k < self.regular { S::of_f64(k as f64) * self.step } else { (self.t_end - self.t0).abs() }
     }
 }
 
 impl<S: Scalar> Samples<S> {
-    /// Number of samples whose elapsed time is not beyond `end`.
+    /// Returns the number of samples whose elapsed time is at most `end`.
     pub(super) fn count_until(&self, end: S) -> usize {
         let (mut low, mut high) = (0, self.len());
         while low < high {
@@ -235,7 +235,7 @@ impl<S: Scalar> Samples<S> {
     }
 }
 
-/// Samples `first..after` in time elapsed since `start`, and the end of their stretch if it is not one of them.
+/// Samples `first..after` with times relative to `start`, and the end of the interval if it is not a sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part<S> {
     pub(super) all: Samples<S>,
@@ -323,7 +323,7 @@ mod tests {
         let single = super::tests::times(RolloutOptions::<f32>::new(100.0, 0.1));
         assert_eq!(single.len(), 1001);
         assert_eq!(*single.last().unwrap(), 100.0);
-        // The last sample is at the end, whatever the rounding of the quotient, and none is later.
+        // The last sample is exactly at the end, whatever the rounding of the quotient, and no sample is later.
         let many = Samples::new(&RolloutOptions::<f32>::new(200_000.0, 1.0));
         assert_eq!((many.len(), many.get(200_000), many.get(200_001)), (200_001, Some(200_000.0), None));
     }

@@ -7,10 +7,10 @@
 //! p0 = -D1 L_d(q0, q1) = dL/dv - h/2 dL/dq,    p1 = D2 L_d(q0, q1) = dL/dv + h/2 dL/dq.
 //! ```
 //!
-//! The discrete action has no friction: models that lose energy are refused. An external force acts at either end by half a step times its
-//! value in the middle, `dL/dq + Q` in place of `dL/dq` (the discrete Lagrange-d'Alembert principle, 3.2.1 there). Order 2, symplectic. In
-//! exact arithmetic the motion is that of the implicit midpoint rule on Hamilton's equations; the derivation needs no Hamiltonian, and the
-//! two check each other.
+//! The discrete action contains no friction, so models that lose energy are rejected. An external force acts at either end with half a step
+//! times its value in the middle: `dL/dq + Q` replaces `dL/dq` (the discrete Lagrange-d'Alembert principle, 3.2.1 in the source). The
+//! method has order 2 and is symplectic. In exact arithmetic the motion equals that of the implicit midpoint rule for Hamilton's equations,
+//! but the derivation needs no Hamiltonian, and the two methods check each other.
 //!
 //! Source: Marsden and West, Discrete mechanics and variational integrators (2001), 1.3.1 and 2.3.1.
 
@@ -19,11 +19,11 @@ use super::phase::{Defect, Derivatives, PhasePoint, PhaseSpace};
 use super::simplified_newton::{Equations, SimplifiedNewton, rounding};
 use crate::scalar::{Real, Scalar};
 
-/// `p0 + D1 L_d(q0, q0 + h u) = 0` for the mean velocity `u`.
+/// The equations `p0 + D1 L_d(q0, q0 + h u) = 0` for the mean velocity `u`.
 struct Discrete<'a, S> {
     state: &'a PhasePoint<S>,
     half_step: S,
-    /// Midpoint, and `dL/dv`, `dL/dq` there.
+    /// Midpoint, and `dL/dv` and `dL/dq` at the midpoint.
     q: &'a mut [S],
     p: &'a mut [S],
     g: &'a mut [S],
@@ -56,7 +56,7 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
         Ok(Defect::of(phase.n, residual, size))
     }
 
-    /// `M + h/2 (B - B^T - C) - h^2/4 K`, `B = dp/dq`, `K = dg/dq`, `C = dQ/dv`.
+    /// Computes `M + h/2 (B - B^T - C) - h^2/4 K`, with `B = dp/dq`, `K = dg/dq`, `C = dQ/dv`.
     fn jacobian(&mut self, phase: &mut PhaseSpace<'_, S>, x: &[S], matrix: &mut [S]) -> Result<(), StepFailure> {
         let n = phase.n;
         self.move_to(x);
@@ -78,7 +78,7 @@ impl<S: Scalar> Equations<S> for Discrete<'_, S> {
     }
 }
 
-/// The integrator with the data that it keeps from step to step.
+/// The integrator with the data stored from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Variational<S> {
     chord: SimplifiedNewton<S>,
@@ -94,7 +94,7 @@ pub(super) struct Variational<S> {
 }
 
 impl<S: Scalar> Variational<S> {
-    /// For `n` coordinates.
+    /// Creates the integrator for `n` coordinates.
     pub(super) fn new(n: usize) -> Self {
         let zero = <S as Real>::zero();
         let vector = vec![zero; n];
@@ -111,7 +111,7 @@ impl<S: Scalar> Variational<S> {
         }
     }
 
-    /// One step of size `h`; `velocity` is close to the velocity at the start before the step and at the end after it.
+    /// Computes one step of size `h`; `velocity` must be close to the velocity at the start, and afterwards is close to that at the end.
     pub(super) fn step(
         &mut self,
         phase: &mut PhaseSpace<'_, S>,
@@ -140,7 +140,7 @@ impl<S: Scalar> Variational<S> {
         }
         for k in 0..phase.n {
             state.q.add(k, h * self.u[k]);
-            // dL/dv = p0 + h/2 dL/dq at the solution: the increment without the rounding errors of dL/dv.
+            // dL/dv = p0 + h/2 dL/dq at the solution; this increment avoids the rounding errors of dL/dv.
             state.p.add(k, h * self.g[k]);
         }
         velocity.copy_from_slice(&self.u);
@@ -150,7 +150,7 @@ impl<S: Scalar> Variational<S> {
         Ok(())
     }
 
-    /// Midpoint and mean velocity of the last step.
+    /// Returns the midpoint and the mean velocity of the last step.
     pub(super) fn stages(&self) -> (&[S], &[S]) {
         (&self.q, &self.u)
     }

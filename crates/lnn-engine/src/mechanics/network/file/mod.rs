@@ -1,8 +1,9 @@
-//! Model files: a network with everything needed to rebuild it, in one safetensors file.
+//! Model files: a network with everything needed to restore it, in one safetensors file.
 //!
-//! `docs/model-format.md` describes every tensor and every key, and how `L` follows from them. The metadata have the one key `lnn`, a JSON
+//! `docs/model-format.md` describes every tensor and every key, and how `L` follows from them. The metadata have one key `lnn`, a JSON
 //! object with the fields of [`Header`] and `checksum`: eight hexadecimal digits, the CRC-32 (IEEE) of that JSON text up to the comma
-//! before `"checksum"`, followed by the bytes of the tensors. Any changed bit is detected and refused. The same model gives the same bytes.
+//! before `"checksum"`, followed by the bytes of the tensors. A file with a changed bit is rejected. The same model always gives the same
+//! bytes.
 
 pub use crate::storage::container::StoredPrecision;
 
@@ -18,13 +19,13 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Failure of a model file.
+/// The error of a model file.
 pub type ModelFileError = ContainerError;
 
-/// Largest file that is read, in bytes.
+/// Size of the largest file that is read, in bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 30;
 
-/// Marks of a model file.
+/// Identification of a model file.
 const MODEL: FileKind = FileKind { name: "model", key: "lnn", format: FORMAT };
 
 /// A network: its description and its flat parameter vector.
@@ -33,13 +34,13 @@ const MODEL: FileKind = FileKind { name: "model", key: "lnn", format: FORMAT };
 /// dissipation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelFile<S> {
-    /// Everything but the weights.
+    /// Everything except the weights.
     pub header: Header,
     /// Weights and biases.
     pub weights: Vec<S>,
 }
 
-/// A tensor of the file: name, shape and place in the flat vector.
+/// A tensor of the file: name, shape and position in the flat vector.
 struct Slot {
     name: String,
     shape: Vec<usize>,
@@ -47,10 +48,10 @@ struct Slot {
 }
 
 impl<S: Scalar> ModelFile<S> {
-    /// The bytes of the file; weights are rounded to `header.precision` (exact when they came from there).
+    /// Returns the bytes of the file; weights are rounded to `header.precision` (exactly, if they were read with that precision).
     ///
     /// # Errors
-    /// A header that contradicts itself, a wrong number of weights, a weight that is not finite.
+    /// The header is inconsistent, the number of weights is wrong, or a weight is not finite.
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelFileError> {
         self.header.validate()?;
         let slots = slots(&self.header.architecture)?;
@@ -74,12 +75,12 @@ impl<S: Scalar> ModelFile<S> {
         pack(&MODEL, &self.header, tensors)
     }
 
-    /// Reads the bytes of a file; never panics and allocates no more than a small multiple of their number.
+    /// Parses the bytes of a file; never panics and allocates at most a small multiple of their number.
     ///
     /// Weights are converted to `S`: widening is exact, `f64` weights read as `f32` are rounded to nearest.
     ///
     /// # Errors
-    /// [`ModelFileError`] for anything but an intact model file of this format.
+    /// [`ModelFileError`] for anything except an intact model file of this format.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelFileError> {
         let (header, file) = unpack::<Header>(&MODEL, bytes)?;
         header.validate()?;
@@ -97,7 +98,7 @@ impl<S: Scalar> ModelFile<S> {
         Ok(Self { header, weights })
     }
 
-    /// Writes the file whole or not at all: a temporary file in the same directory, synchronised, then renamed.
+    /// Writes the file atomically: to a temporary file in the same directory, which is synchronised and then renamed.
     ///
     /// # Errors
     /// Those of [`ModelFile::to_bytes`], and [`ModelFileError::Write`].
@@ -105,7 +106,7 @@ impl<S: Scalar> ModelFile<S> {
         self.save_to(&Disk, path)
     }
 
-    /// [`ModelFile::save`] through the operations of `files`.
+    /// Does the same as [`ModelFile::save`] with the file operations `files`.
     ///
     /// # Errors
     /// Those of [`ModelFile::save`].
@@ -117,16 +118,16 @@ impl<S: Scalar> ModelFile<S> {
     /// Reads a regular file of at most 1 GiB.
     ///
     /// # Errors
-    /// As [`ModelFile::from_bytes`], and [`ModelFileError::Read`].
+    /// Those of [`ModelFile::from_bytes`], and [`ModelFileError::Read`].
     pub fn load(path: &Path) -> Result<Self, ModelFileError> {
         Self::from_bytes(&read_regular(path, MAX_BYTES)?)
     }
 }
 
-/// The tensors of an architecture in the order of the flat vector.
+/// Returns the tensors of an architecture in the order of the flat vector.
 fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
-    // Shapes are only claims until they are compared with the file: multiply them out without overflow first. The
-    // branches of a hybrid share the widths and have no more weights than one network.
+    // The shapes are not checked against the file yet, so compute their products without overflow first. The branches of a hybrid share the
+    // widths and have at most as many weights as one network.
     let features = 3 * architecture.coordinates;
     let mut inputs = Some(features);
     let mut total = Some(architecture.activation.branches().len() * (1 + 2 * features));
@@ -186,13 +187,13 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
 /// Format that this version writes and reads.
 pub const FORMAT: u32 = 1;
 
-/// Largest number of coordinates of a model: the memory of an evaluation grows with its square, that of a file does not.
+/// Largest number of coordinates of a model; the memory of an evaluation grows with its square, unlike that of a file.
 pub const MAX_COORDINATES: usize = 256;
 
 /// Largest width of a hidden layer.
 pub const MAX_WIDTH: usize = 1 << 16;
 
-/// Everything needed to rebuild a model but its weights.
+/// Everything needed to restore a model except its weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
@@ -202,9 +203,9 @@ pub struct Header {
     pub crate_version: String,
     /// Shape of the network, scales and periodic coordinates.
     pub architecture: Architecture,
-    /// Name of the system that it learned: one of the catalogue, or any text for a recorded system.
+    /// Name of the system that was learned: one of the catalogue, or any text for a recorded system.
     pub system: String,
-    /// The system itself, if it is described by a file; it has this name.
+    /// The system itself, if a file describes it; it has this name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub description: Option<Description>,
     /// Values of all parameters of that system, in their units; empty for a recorded system.
@@ -214,8 +215,8 @@ pub struct Header {
     /// Names of the columns of the known external forces in the training data, one per coordinate; empty if there were none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<String>,
-    /// Formulas that vanish along the motion, by name, over coordinates and velocities: constraints found in the training motion, or given
-    /// with it. Empty if there were none, and if the constraints are those of the description.
+    /// Formulas that vanish along the motion, by name, in terms of coordinates and velocities: constraints found in the training motion, or
+    /// given with it. Empty if there are none, or if they belong to the description.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub constraints: BTreeMap<String, String>,
     /// Number type of the weights.
@@ -226,12 +227,12 @@ pub struct Header {
     pub velocity: Vec<[f64; 2]>,
     /// Seed of the training.
     pub seed: u64,
-    /// Validation loss of these weights, paper convention.
+    /// Validation loss of these weights, as defined in the paper.
     pub validation_loss: f64,
 }
 
 impl Header {
-    /// Checks that lengths agree, numbers are finite and sizes are sensible.
+    /// Checks that lengths match, numbers are finite and sizes are within the limits.
     ///
     /// # Errors
     /// [`ContainerError::Header`] or [`ContainerError::Version`].
@@ -265,7 +266,7 @@ impl Header {
         require(self.validation_loss.is_finite(), "validation_loss: expected a finite number")
     }
 
-    /// The formulas of the constraints, if these do not come from a description.
+    /// Returns the formulas of the constraints, if these do not come from a description.
     fn formulas(&self) -> Result<Option<FormulaConstraints>, ContainerError> {
         if self.constraints.is_empty() {
             return Ok(None);
@@ -275,12 +276,12 @@ impl Header {
         compiled.map(Some).map_err(|error| ContainerError::Header(error.to_string()))
     }
 
-    /// `true` if the motion has constraints.
+    /// Returns `true` if the motion has constraints.
     pub fn is_constrained(&self) -> bool {
         !self.held_by().is_empty()
     }
 
-    /// The constraints of the motion, formulas by name; those of a description have its parameters and definitions inserted.
+    /// Returns the constraints of the motion, formulas by name; in those of a description, parameters and definitions are inserted.
     pub fn held_by(&self) -> &BTreeMap<String, String> {
         match &self.description {
             Some(description) if self.constraints.is_empty() => &description.constraints,
@@ -288,10 +289,10 @@ impl Header {
         }
     }
 
-    /// The motion of the model: that of its network, under the constraints of its training.
+    /// Applies the constraints of the training motion to the network.
     ///
     /// # Errors
-    /// [`ContainerError::Header`] for constraints that contradict each other or leave no motion, or a network of other coordinates.
+    /// [`ContainerError::Header`] if the constraints contradict each other or leave no motion, or the network has other coordinates.
     pub fn constrain<'a, S: Scalar>(
         &self,
         network: Box<dyn EulerLagrange<S> + 'a>,
@@ -305,7 +306,7 @@ impl Header {
         }
     }
 
-    /// The described system whose constraints apply to the motion.
+    /// Returns the described system whose constraints apply to the motion.
     fn holding<S: Scalar>(&self) -> Result<Option<SystemInstance<S>>, ContainerError> {
         let described = self.description.as_ref().filter(|description| !description.constraints.is_empty());
         let Some(description) = described else { return Ok(None) };
@@ -313,11 +314,11 @@ impl Header {
         configure_values(Cow::Owned(system), &self.parameters).map(Some).map_err(wrong)
     }
 
-    /// The constraints of the motion as functions of states, with the values of their parameters; none if it is free. Those of a
-    /// description may depend on each other.
+    /// Returns the constraints of the motion as functions of the state, with the values of their parameters; `None` if it is free. Those of
+    /// a description may depend on each other.
     ///
     /// # Errors
-    /// [`ContainerError::Header`] for formulas or parameters that do not fit.
+    /// [`ContainerError::Header`] if formulas or parameters are invalid.
     #[doc(hidden)]
     pub fn constraints(&self) -> Result<Option<(ExpressionConstraints, Vec<f64>)>, ContainerError> {
         if let Some(formulas) = self.formulas()? {

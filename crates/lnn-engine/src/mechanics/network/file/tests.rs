@@ -1,4 +1,4 @@
-//! Round trips, damage and foreign files.
+//! Tests round trips, damaged files and files of other programs.
 
 use super::*;
 use crate::lagrangian::EulerLagrange;
@@ -43,7 +43,7 @@ fn model(hidden: Vec<usize>, precision: StoredPrecision) -> ModelFile<f64> {
     with_numbers(header(hidden, true, precision))
 }
 
-/// One or two branches, with and without an input layer, and one branch with a dissipation, in both precisions.
+/// Models with one or two branches, with and without an input layer, and one branch with dissipation, in both precisions.
 fn every_kind(hidden: &[usize]) -> Vec<ModelFile<f64>> {
     let mut models = Vec::new();
     for precision in [StoredPrecision::F32, StoredPrecision::F64] {
@@ -73,7 +73,7 @@ fn with_numbers(header: Header) -> ModelFile<f64> {
     ModelFile { header, weights }
 }
 
-/// Takes the file apart and puts it together again with other metadata or tensors.
+/// Unpacks a file and packs it again with changed metadata or tensors.
 fn rebuilt(bytes: &[u8], change: impl FnOnce(&mut String, &mut Vec<(String, Dtype, Vec<usize>, Vec<u8>)>)) -> Vec<u8> {
     let (_, metadata) = SafeTensors::read_metadata(bytes).unwrap();
     let file = SafeTensors::deserialize(bytes).unwrap();
@@ -118,13 +118,13 @@ fn saves_and_loads_the_same_bytes() {
     assert_eq!(std::fs::read_dir(&directory).unwrap().count(), 1);
 }
 
-/// The same tensors once per branch of a hybrid.
+/// Duplicates the tensors for both branches of a hybrid.
 fn in_both_branches(tensors: Vec<(String, Vec<usize>)>) -> Vec<(String, Vec<usize>)> {
     let branch = |b: usize| tensors.iter().map(move |(name, shape)| (format!("branches.{b}.{name}"), shape.clone()));
     branch(0).chain(branch(1)).collect()
 }
 
-/// Format 1 was first written without the field `input_layer`: a model without one is still written so.
+/// The first files of format 1 had no field `input_layer`; a model without an input layer is still written without it.
 #[test]
 fn files_from_before_the_input_layer_load_and_keep_their_bytes() {
     let plain = model(vec![2], StoredPrecision::F64);
@@ -140,7 +140,7 @@ fn files_from_before_the_input_layer_load_and_keep_their_bytes() {
     assert_eq!(loaded.to_bytes().unwrap(), bytes);
 }
 
-/// So was it without the field `time_like`; a model with one keeps it.
+/// The same holds for the field `time_like`; a model with a time-like coordinate keeps it.
 #[test]
 fn files_name_a_time_like_coordinate_if_there_is_one() {
     let mut model = model(vec![2], StoredPrecision::F64);
@@ -296,7 +296,7 @@ fn claims_of_the_description_are_checked() {
     }
 }
 
-/// A list of numbers costs a few bytes per coordinate, a mass matrix its square.
+/// A list of numbers takes a few bytes per coordinate, but a mass matrix takes their square.
 #[test]
 fn coordinates_and_widths_are_bounded() {
     let sized = |n: usize, width: usize| {
