@@ -12,12 +12,12 @@ use crate::scalar::{Real, Scalar};
 pub(crate) struct ConstrainedMotion<S> {
     n: usize,
     m: usize,
-    /// Rows `A` at unit length, `(states, m, n)`, their scaling factors, and `-gamma` at that length, `(states, m)`.
+    /// Rows `A` scaled to unit length, `(states, m, n)`, their scaling factors, and `-gamma` scaled alike, `(states, m)`.
     rows: Vec<S>,
     unit: Vec<S>,
     drift: Vec<S>,
     bordered: Bordered<S>,
-    /// Multipliers of rows at unit length, `(states, m)`.
+    /// Multipliers of the scaled rows, `(states, m)`.
     load: Vec<S>,
 }
 
@@ -29,7 +29,7 @@ impl<S> Default for ConstrainedMotion<S> {
 }
 
 impl<S: Scalar> ConstrainedMotion<S> {
-    /// Discards all states; the following ones have `n` coordinates and `m` constraints.
+    /// Removes all states; states added later have `n` coordinates and `m` constraints.
     pub fn clear(&mut self, (n, m): (usize, usize)) {
         (self.n, self.m) = (n, m);
         [&mut self.rows, &mut self.unit, &mut self.drift].into_iter().for_each(Vec::clear);
@@ -41,7 +41,7 @@ impl<S: Scalar> ConstrainedMotion<S> {
         for (gradient, &drift) in matrix.chunks_exact(self.n).zip(drift) {
             let scaled = gradient.iter().zip(scale).map(|(&a, &s)| a * s);
             let square = scaled.clone().fold(zero, |sum, a| sum + a * a);
-            // A row of zeros is left for the solver, which finds it singular.
+            // A row of zeros is kept; the solver detects that the matrix is singular.
             let unit = if square > zero { Real::sqrt(square).recip() } else { <S as Real>::one() };
             self.rows.extend(scaled.map(|a| a * unit));
             self.unit.push(unit);
@@ -49,18 +49,18 @@ impl<S: Scalar> ConstrainedMotion<S> {
         }
     }
 
-    /// Takes the mass matrices of the states, `(states, n, n)`.
+    /// Sets the mass matrices of the states, `(states, n, n)`.
     pub fn border(&mut self, masses: &[S]) {
         self.bordered.set((self.n, self.m), masses, &self.rows);
         self.load.resize(self.drift.len(), <S as Real>::zero());
     }
 
-    /// Accelerations under forces `f`, both `(states, n)`; `true` if no state failed.
+    /// Solves for the accelerations under forces `f`, both `(states, n)`; `true` if no state failed.
     pub fn motion(&mut self, force: &[S], acceleration: &mut [S], workspace: &mut Workspace<S>) -> bool {
         self.bordered.solve(force, &self.drift, acceleration, &mut self.load, workspace)
     }
 
-    /// `lam` for a loss whose derivative by the accelerations is `u`, both `(states, n)`; `true` if no state failed.
+    /// Solves for `lam` of a loss whose derivative with respect to the accelerations is `u`, both `(states, n)`; `true` if no state failed.
     pub fn adjoint(&mut self, u: &[S], lam: &mut [S], workspace: &mut Workspace<S>) -> bool {
         self.bordered.solve(u, &[], lam, &mut self.load, workspace)
     }
@@ -70,7 +70,7 @@ impl<S: Scalar> ConstrainedMotion<S> {
         out.extend(self.load.iter().zip(&self.unit).map(|(&load, &unit)| load * unit));
     }
 
-    /// An orthonormal basis of the forces, `(n)` in units of their own, that the constraints of a state can carry, `A^T lambda`.
+    /// Orthonormal basis of the constraint forces `A^T lambda` of a state, where forces `(n)` are in the given units.
     pub fn carried(&self, state: usize, units: &[S]) -> Vec<S> {
         let size = self.m * self.n;
         let rows = &self.rows[state * size..(state + 1) * size];
@@ -78,8 +78,8 @@ impl<S: Scalar> ConstrainedMotion<S> {
         independent_rows(self.n, &rows).1
     }
 
-    /// The eigenvalue penalty of a state within its constraints: minus the sum of the negative eigenvalues of `Z^T M Z`, with its
-    /// directions.
+    /// Computes the eigenvalue penalty of a state within its constraints: minus the sum of the negative eigenvalues of `Z^T M Z`; also sets
+    /// its directions.
     pub fn violation(&self, state: usize, mass: &[S], violation: &mut Violation<S>) {
         let (n, m) = (self.n, self.m);
         *violation = Violation::default();

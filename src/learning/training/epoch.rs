@@ -1,4 +1,4 @@
-//! Rows of a history, and the sums they come from.
+//! Rows of a training history, and the sums from which they are computed.
 
 use crate::lagrangian::MechanicsError;
 use crate::linalg::Failure;
@@ -7,9 +7,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// One row of the history.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Epoch {
-    /// Counted from 1 over all phases.
+    /// Number of the epoch, counted from 1 over all phases.
     pub epoch: usize,
-    /// Counted from 1.
+    /// Number of the phase, counted from 1.
     pub phase: usize,
     /// Learning rate at the start of the epoch.
     pub rate: f64,
@@ -46,13 +46,13 @@ pub(crate) struct Means {
 }
 
 impl Means {
-    /// All its counts.
+    /// Returns all counts.
     pub(crate) fn counts(&self) -> [usize; 4] {
         [self.penalised, self.left_out, self.skipped, self.taken]
     }
 }
 
-/// Stores the failure of a state as its row and the reason.
+/// Serializes the failure of a state as its row and the reason.
 mod failure {
     use super::*;
 

@@ -14,23 +14,23 @@ use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use std::sync::atomic::Ordering;
 
-/// Start of a refinement, the same for all iterations.
+/// Initial values of a refinement, the same for all iterations.
 pub(crate) struct Start {
-    /// Parameters to begin with.
+    /// Initial parameters.
     pub weights: Vec<f64>,
-    /// Their validation loss.
+    /// Validation loss of the initial parameters.
     pub validation_loss: f64,
     /// Last epoch and phase of the history so far.
     pub last: (usize, usize),
     /// Time since training began.
     pub clock: Clock,
-    /// The observer.
+    /// Observer and interrupt flag.
     pub hooks: Hooks,
 }
 
 /// Result of a refinement.
 pub(crate) struct Refined {
-    /// Parameters of the lowest validation loss, if lower than at the start.
+    /// Parameters with the lowest validation loss, if it is lower than at the start.
     pub weights: Option<Vec<f64>>,
     /// Lowest validation loss.
     pub validation_loss: f64,
@@ -47,7 +47,7 @@ struct Bounded<'p, 'a> {
 }
 
 impl Bounded<'_, '_> {
-    /// `true` if a point may be evaluated.
+    /// Counts an evaluation and checks the limit.
     fn admit(&self, weights: &[f64]) -> Result<(), Error> {
         if self.problem.is_known(weights) {
             Ok(())
@@ -81,7 +81,7 @@ impl Gradient for Bounded<'_, '_> {
     }
 }
 
-/// The iterates so far, kept outside argmin, which drops problem and solver if a line search fails.
+/// The iterates so far, kept outside argmin, because argmin drops problem and solver if a line search fails.
 struct Record<'p, 'a> {
     problem: &'p TrainingProblem<'a, f64>,
     hooks: &'p Hooks,
@@ -91,7 +91,7 @@ struct Record<'p, 'a> {
 }
 
 impl Record<'_, '_> {
-    /// Judges an iterate on the validation states and writes its row.
+    /// Evaluates an iterate on the validation states and adds a row to the history.
     fn note(&mut self, weights: &[f64]) {
         let validation_loss = self.problem.validation_loss(weights).loss;
         let refined = &mut self.refined;
@@ -125,7 +125,7 @@ impl Record<'_, '_> {
 
 type Iteration = IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
 
-/// A solver of argmin's whose iterates are recorded.
+/// Wraps a solver of argmin and records its iterates.
 struct Recorded<'r, 'p, 'a, L> {
     solver: L,
     record: &'r mut Record<'p, 'a>,
@@ -163,7 +163,7 @@ impl<'p, 'a, L: Solver<Bounded<'p, 'a>, Iteration>> Solver<Bounded<'p, 'a>, Iter
     }
 }
 
-/// Refines the weights; a failed line search ends this and keeps the best iterate.
+/// Refines the weights; a failed line search ends the refinement, which keeps the best iterate.
 ///
 /// # Errors
 /// The message of argmin if not even the start could be evaluated.

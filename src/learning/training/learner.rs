@@ -1,4 +1,4 @@
-//! Samples that the loop over epochs learns from: states of a dataset here, segments of motion in multiple shooting.
+//! Interface between the epoch loop and its samples: states of a dataset, or segments of motion in multiple shooting.
 
 use super::thresholds::STATES_PER_LEFT_OUT;
 use crate::optimizers::{Method, Moments};
@@ -13,44 +13,44 @@ use std::sync::Arc;
 pub(crate) struct Validation {
     /// The value shown in the history.
     pub loss: f64,
-    /// The value by which parameters are compared, infinite if it is meaningless.
+    /// The value for comparing parameters; infinite if it is meaningless.
     pub cost: f64,
 }
 
-/// Samples for learning batch by batch, with any unknowns besides the weights.
+/// Samples to learn from in batches, possibly with unknowns in addition to the weights.
 pub(crate) trait Learner<S: Scalar> {
-    /// Evaluates batches.
+    /// Problem that evaluates batches.
     type Problem;
 
     /// Moments of `parameters` weights before the first step of an update rule.
     fn moments(&mut self, problem: &mut Self::Problem, method: Method, parameters: usize) -> Moments<S>;
 
-    /// Number of weights that decay; they come first among the parameters.
+    /// Number of weights that decay; they are the first parameters.
     fn decaying(&self, problem: &mut Self::Problem) -> usize;
 
     /// Threads of the run.
     fn pool(&self, problem: &mut Self::Problem) -> Arc<rayon::ThreadPool>;
 
-    /// Before the first epoch; the cost of the weights given, where the epochs have to beat it.
+    /// Called before the first epoch; returns the cost of the initial weights if the epochs have to improve on it.
     fn begin(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Option<f64> {
         let _ = (problem, weights);
         None
     }
 
-    /// Before epoch `epoch` of this phase, counted from 0.
+    /// Called before epoch `epoch` of this phase, counted from 0.
     fn begin_epoch(&mut self, problem: &mut Self::Problem, weights: &[S], epoch: u64) {
         let _ = (problem, weights, epoch);
     }
 
-    /// Loss, penalty and gradient of the samples `rows`; `gradient` is overwritten.
+    /// Computes loss, penalty and gradient of the samples `rows`; overwrites `gradient`.
     fn step(&mut self, problem: &mut Self::Problem, weights: &[S], rows: &[u32], gradient: &mut [S]) -> BatchReport<S>;
 
-    /// Called after the gradient of the last step has changed the weights.
+    /// Called after the weights have been updated with the gradient of the last step.
     fn follow(&mut self, problem: &mut Self::Problem) {
         let _ = problem;
     }
 
-    /// States of one sample at which the penalty is taken.
+    /// Number of states of one sample at which the penalty is evaluated.
     fn penalty_states(&self, problem: &Self::Problem) -> usize {
         let _ = problem;
         1
@@ -64,7 +64,7 @@ pub(crate) trait Learner<S: Scalar> {
     /// Loss of the validation samples.
     fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation;
 
-    /// Unknowns besides the weights, after `seconds` of this phase, in bytes for a checkpoint; `None` if there are none.
+    /// Serializes the unknowns other than the weights for a checkpoint, after `seconds` of this phase; `None` if there are none.
     fn stored(&self, seconds: f64) -> Option<Vec<u8>> {
         let _ = seconds;
         None
@@ -75,7 +75,7 @@ pub(crate) trait Learner<S: Scalar> {
 pub(crate) struct States<'a>(PhantomData<&'a ()>);
 
 impl States<'_> {
-    /// The states of any problem.
+    /// Creates a learner for the states of any problem.
     pub(crate) fn new() -> Self {
         Self(PhantomData)
     }
@@ -100,7 +100,7 @@ impl<'a, S: Scalar> Learner<S> for States<'a> {
         problem.step(weights, rows, gradient)
     }
 
-    /// A loss that is not finite, or leaves out more than a few of the states, is never the best.
+    /// A loss that is not finite, or that leaves out more than a few states, never counts as the best.
     fn validate(&mut self, problem: &mut Self::Problem, weights: &[S]) -> Validation {
         let report = problem.validation_loss(weights);
         let loss = report.loss.to_f64();

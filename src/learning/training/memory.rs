@@ -6,14 +6,14 @@ use crate::network::{Architecture, Layout};
 use crate::optimizers::eigenbasis_numbers;
 use crate::training::objective::{CHUNK, SHARDS};
 
-/// Vectors of all weights that training holds: weights, gradient, two moments, average, the best of the phase and of those
-/// before (each twice), the last two that were validated, and the start.
+/// Number of weight-sized vectors in a training: weights, gradient, two moments, average, the best of the phase and of earlier phases (each
+/// twice), the last two validated ones, and the initial one.
 const VECTORS: u64 = 12;
-/// Copies of a checkpoint's numbers while it is written: the copy, its bytes, the file's bytes, those read back.
+/// Number of copies of a checkpoint's numbers during writing: the copy, its bytes, the file's bytes, and those read back.
 const COPIES: u64 = 4;
-/// Vectors of all weights in a checkpoint, as often as each is held while it is written.
+/// Number of weight-sized vectors in all copies of a checkpoint during writing.
 const CHECKPOINT: u64 = 6 * COPIES;
-/// Vectors of all weights that L-BFGS holds in addition to two for each pair that it remembers.
+/// Number of weight-sized vectors in L-BFGS, besides two for each stored pair.
 const LBFGS: u64 = 14;
 
 /// Approximate upper bound of the bytes that a training takes; `None` if they cannot be counted in 64 bits.
@@ -88,12 +88,12 @@ pub fn training_memory(config: &Config, architecture: &Architecture) -> Option<u
     ])
 }
 
-/// A product, if it can be counted.
+/// Product, or `None` on overflow.
 fn product<const N: usize>(factors: [u64; N]) -> Option<u64> {
     factors.into_iter().try_fold(1_u64, u64::checked_mul)
 }
 
-/// A sum, if it can be counted.
+/// Sum, or `None` on overflow.
 fn sum<const N: usize>(terms: [Option<u64>; N]) -> Option<u64> {
     terms.into_iter().try_fold(0_u64, |sum, term| sum.checked_add(term?))
 }

@@ -26,7 +26,7 @@ pub use recipe::{RecipeError, TrainingResult, run};
 pub use solver::{Hooks, Progress, StepError, Watcher};
 pub use trainer::{Trained, TrainingError, train};
 
-// For the packages of this repository.
+// Used by the other packages of this repository.
 #[doc(hidden)]
 pub use {
     checkpoint::{

@@ -5,12 +5,12 @@
 //! dataset may have [weights](Dataset::with_weights).
 //!
 //! Accelerations solve `M a = g - c - dD/dv + Q` with the network's dissipation `D` and the data's known forces `Q`, if there are any. A
-//! loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; those of `L` enter as without friction, but at
-//! the `a` with friction.
+//! loss `l(a)` depends on the parameters of `D` by `dl = -lam.d(dD/dv)`, `lam = M^-1 dl/da`; for those of `L`, the formula without friction
+//! applies, with the `a` that includes friction.
 //!
 //! States may instead have [residuals of force](Dataset::with_force_residuals) `r = M a + c - g + dD/dv - Q` at the accelerations of the
-//! data: a loss `l(r)` has the gradient of one on accelerations with `lam = -dl/dr` and this `a`, and nothing is solved for. Under
-//! constraints, only the part of `r` that no force `A^T lambda` explains counts.
+//! data: a loss `l(r)` has the gradient of one on accelerations with `lam = -dl/dr` and this `a`, and no linear system is solved. Under
+//! constraints, only the part of `r` counts that no force `A^T lambda` explains.
 //!
 //! Under constraints, rows `A` of the data, they solve `[M A^T; A 0] [a; -lambda] = [g - c + Q; -gamma]`. With the same matrix and `[lam;
 //! nu]` for `[dl/da; 0]` the gradient is that without constraints, at this `lam` and this `a`: `A lam = 0`. Every penalty acts on the
@@ -32,9 +32,9 @@ use crate::training::violations::Violations;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// States evaluated together.
+/// Number of states that are evaluated together.
 pub(crate) const CHUNK: usize = STATES;
-/// Stripes a batch is cut into at most; each has its own gradient.
+/// Largest number of shards of a batch; each has its own gradient.
 pub(crate) const SHARDS: usize = 8;
 
 /// Outcome of a batch.
@@ -48,7 +48,7 @@ pub struct BatchReport<S> {
     pub penalised: usize,
     /// States left out because they have no finite acceleration, or no finite force if the training uses forces.
     pub left_out: usize,
-    /// First state, by its row in the dataset, that failed, and why.
+    /// The first state that failed, by its row in the dataset, with the reason.
     pub failure: Option<MechanicsError>,
 }
 
@@ -60,7 +60,7 @@ pub struct Objective<S> {
     shards: Vec<Shard<S>>,
 }
 
-/// Threads for all that a run computes: as many as a batch has parts at most, and fewer where the system starts no more.
+/// Creates the thread pool of a run: at most as many threads as a batch has shards, and fewer if the operating system refuses more.
 ///
 /// # Errors
 /// [`ThreadsError`] if not even one can be started.
@@ -75,7 +75,7 @@ pub(crate) fn threads(count: usize) -> Result<Arc<rayon::ThreadPool>, ThreadsErr
     }
 }
 
-/// Threads that could not be started.
+/// The threads could not be started.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cannot start {threads} threads: {problem}")]
 pub struct ThreadsError {
@@ -100,7 +100,7 @@ struct Shard<S> {
     signature: Buffers<S>,
     violation: Violation<S>,
     held: ConstrainedMotion<S>,
-    /// `|M_ii|` of every state, `(states, n)`, and the states whose signature is in doubt with their matrices.
+    /// `|M_ii|` of every state, `(states, n)`, and the states whose signature may be wrong, with their matrices.
     diagonal: Vec<S>,
     suspects: Vec<usize>,
     suspect_matrices: Vec<S>,
@@ -147,7 +147,7 @@ impl<S: Scalar> Shard<S> {
         self.suspect_matrices.clear();
     }
 
-    /// Copies the states of these rows side by side.
+    /// Gathers the states of these rows.
     fn gather(&mut self, data: &Dataset<S>, rows: &[u32]) {
         let n = data.coordinates();
         self.q.clear();
@@ -159,7 +159,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Loss and gradient of one chunk, with its penalty; for a penalty that needs scales, stores its inputs for all states.
+    /// Loss and gradient of one chunk, with its penalty; if the penalty needs scales, stores its inputs for all states instead.
     ///
     /// `weight` is `1/(2 n counted)`, where `counted` is the number of states of the batch that count; the penalty has its weight over the
     /// batch.
@@ -174,14 +174,14 @@ impl<S: Scalar> Shard<S> {
             _ if penalty.needs_scales() => self.note_suspects(penalty),
             _ => self.add_violations(penalty, lambda),
         }
-        // Zero directions on finite numbers leave the failed states out.
+        // Zero directions exclude the failed states.
         if self.add_directions(data) || self.replace_failed(weights) {
             self.dynamics.add_gradient(weights, &self.directions, &mut self.gradient, None);
         }
         self.violations.add_gradient(weights, false, &mut self.gradient);
     }
 
-    /// Evaluates the chunk again with valid states in place of those without an acceleration; `true` if there is a valid one.
+    /// Evaluates the chunk again after replacing states without an acceleration by valid ones; `true` if there is a valid state.
     fn replace_failed(&mut self, weights: &[S]) -> bool {
         let n = self.scale.len();
         let failed = |row: &[S]| row[0].is_nan();
@@ -196,7 +196,7 @@ impl<S: Scalar> Shard<S> {
         true
     }
 
-    /// Keeps the diagonals of the chunk's mass matrices, and the states whose signature is not clearly right.
+    /// Stores the diagonals of the chunk's mass matrices, and the states whose signature may be wrong.
     fn note_suspects(&mut self, penalty: Penalty) {
         let n = self.scale.len();
         for matrix in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n) {
@@ -208,7 +208,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// The penalty of the suspect states and its gradient, with the scales of the whole batch.
+    /// Adds the penalty of these states and its gradient, using the scales of the whole batch.
     fn add_suspects(
         &mut self,
         weights: &[S],
@@ -228,14 +228,14 @@ impl<S: Scalar> Shard<S> {
         self.violations.add_gradient(weights, true, &mut self.gradient);
     }
 
-    /// Losses of one chunk, no gradient.
+    /// Adds the losses of one chunk without gradient.
     fn add_losses(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32]) {
         self.gather(data, rows);
         self.dynamics.evaluate(weights, &self.q, &self.v, Depth::Motion, true);
         self.add_residuals(data, rows, <S as Real>::one());
     }
 
-    /// Accelerations of the chunk, scaled; `NaN` where a state fails, which is noted with its row.
+    /// Solves for the scaled accelerations of the chunk; `NaN` for a state that fails, whose row is recorded.
     fn solve(&mut self, data: &Dataset<S>, rows: &[u32]) {
         let n = self.scale.len();
         self.dynamics.right_hand_sides(&mut self.right);
@@ -256,7 +256,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Takes the constraints of the chunk.
+    /// Loads the constraints of the chunk.
     fn hold(&mut self, data: &Dataset<S>, rows: &[u32]) {
         self.held.clear((data.coordinates(), data.constraints()));
         for &row in rows {
@@ -264,8 +264,8 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Solves for `right`: into the accelerations for the motion of the states, otherwise with `A x = 0` into the multipliers of the loss;
-    /// `true` if no state failed.
+    /// Solves the linear systems with right-hand side `right`: for the accelerations if `motion`, otherwise for the multipliers of the
+    /// loss, with `A x = 0`; `true` if no state failed.
     fn solve_motion(&mut self, n: usize, m: usize, motion: bool) -> bool {
         let Self { held, right, workspace, .. } = self;
         let solution = if motion { &mut self.acceleration } else { &mut self.multiplier };
@@ -291,7 +291,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Absolute residuals of the states; stores the input of [`add_directions`](Self::add_directions).
+    /// Computes absolute residuals of the states, and the input of [`add_directions`](Self::add_directions).
     fn add_residuals(&mut self, data: &Dataset<S>, rows: &[u32], weight: S) {
         if data.force_scale().is_empty() {
             self.solve(data, rows);
@@ -301,8 +301,8 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Absolute residuals of the forces, each over its scale; leaves `dl/dr`, with `l` weighted by `weight`, in `right`, and the
-    /// accelerations of the data, scaled, `NaN` where a residual is not finite.
+    /// Computes absolute residuals of the forces, each divided by its scale. Stores `dl/dr`, with `l` weighted by `weight`, in `right`, and
+    /// the scaled accelerations of the data, which are `NaN` where a residual is not finite.
     fn add_force_residuals(&mut self, data: &Dataset<S>, rows: &[u32], weight: S) {
         let (n, zero) = (data.coordinates(), <S as Real>::zero());
         self.dynamics.right_hand_sides(&mut self.right);
@@ -330,7 +330,7 @@ impl<S: Scalar> Shard<S> {
                 right.fill(zero);
                 continue;
             }
-            // A force that the constraints can carry is not a residual: motion does not determine it.
+            // A force that the constraints can carry is removed from the residual, because motion does not determine it.
             let carried = if held { self.held.carried(state, &units) } else { Vec::new() };
             right.iter_mut().zip(&units).for_each(|(r, &unit)| *r *= unit);
             take_out(right, &carried);
@@ -344,7 +344,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Absolute residuals of the accelerations; leaves `-dl/da`, with `l` weighted by `weight`, in `right`.
+    /// Computes absolute residuals of the accelerations; stores `-dl/da`, with `l` weighted by `weight`, in `right`.
     fn add_acceleration_residuals(&mut self, data: &Dataset<S>, rows: &[u32], weight: S) {
         let n = data.coordinates();
         let zero = <S as Real>::zero();
@@ -367,14 +367,14 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Directions of the loss: `s = -lam`, which is `-M^-1 dl/da` or `dl/dr`, `t = a`, zeros for states that have no acceleration;
-    /// whether all have one.
+    /// Sets the directions of the loss: `s = -lam`, which is `-M^-1 dl/da` or `dl/dr`, and `t = a`; zeros for states without an
+    /// acceleration. Returns whether all states have one.
     fn add_directions(&mut self, data: &Dataset<S>) -> bool {
         let n = self.scale.len();
         self.directions.clear(true);
         if data.force_scale().is_empty() {
             self.multiplier.resize(self.right.len(), <S as Real>::zero());
-            // The same matrices failed before, and their rows are skipped.
+            // Rows whose matrices failed before are skipped.
             self.solve_motion(n, data.constraints(), false);
             self.directions.s.extend_from_slice(&self.multiplier);
         } else {
@@ -393,7 +393,7 @@ impl<S: Scalar> Shard<S> {
         all
     }
 
-    /// Counts the eigenvalue penalties of the chunk within its constraints.
+    /// Adds the eigenvalue penalties of the chunk within its constraints.
     fn add_reduced_eigenvalue(&mut self, lambda: S) {
         let n = self.scale.len();
         for (state, mass) in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n).enumerate() {
@@ -403,7 +403,7 @@ impl<S: Scalar> Shard<S> {
         }
     }
 
-    /// Counts the violations of the chunk under a penalty without scales.
+    /// Adds the violations of the chunk for a penalty without scales.
     fn add_violations(&mut self, penalty: Penalty, lambda: S) {
         let n = self.scale.len();
         for (state, matrix) in self.dynamics.lagrangian().mass_matrix.chunks_exact(n * n).enumerate() {
@@ -444,7 +444,7 @@ impl<S: Scalar> Objective<S> {
         Ok(Self::on(self::threads(threads)?, model, penalty))
     }
 
-    /// An objective for any model on threads that others use too.
+    /// Creates an objective for any model on a shared thread pool.
     pub(crate) fn on(pool: Arc<rayon::ThreadPool>, model: Model<S>, penalty: Penalty) -> Self {
         Self { model, penalty, pool, shards: Vec::new() }
     }
@@ -474,7 +474,8 @@ impl<S: Scalar> Objective<S> {
         count
     }
 
-    /// Loss, penalty and gradient of the states `rows` of `data`; `gradient` is overwritten.
+    /// Computes loss, penalty and gradient of the states `rows` of `data`; overwrites `gradient`. The loss is the mean over the states that
+    /// are not left out, the penalty the mean over all states, and the gradient is that of their sum.
     ///
     /// The gradient is that of `loss + penalty` of the report: the loss is the mean over the states that are not left out, the penalty that
     /// over all states.
@@ -484,8 +485,8 @@ impl<S: Scalar> Objective<S> {
         let mut shards = self.evaluate(weights, data, rows, rows.len(), lambda);
         let counted = rows.len() - self.left_out(shards);
         if 0 < counted && counted < rows.len() {
-            // How many count is known only now; to repeat the few batches that leave states out is cheaper than to keep
-            // the gradients of loss and penalty apart in all.
+            // Only now is the number of counted states known. Few batches leave states out, so repeating them is cheaper than storing
+            // separate gradients of loss and penalty for all batches.
             shards = self.evaluate(weights, data, rows, counted, lambda);
         }
         if self.shards[..shards].iter().any(|shard| !shard.suspects.is_empty()) {
@@ -497,8 +498,8 @@ impl<S: Scalar> Objective<S> {
         self.report(shards.len(), rows.len(), data.coordinates())
     }
 
-    /// Sums of loss, penalty and gradient over the batch, where `counted` states are not left out; a penalty that needs scales is separate.
-    /// Returns the number of shards.
+    /// Sums of loss, penalty and gradient over the batch, where `counted` states are not left out; a penalty that needs scales is added
+    /// elsewhere. Returns the number of shards.
     fn evaluate(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], counted: usize, lambda: S) -> usize {
         let weight = (S::of_f64(2.0 * data.coordinates() as f64) * S::of_f64(counted as f64)).recip();
         let penalty = self.penalty;
@@ -511,18 +512,18 @@ impl<S: Scalar> Objective<S> {
         })
     }
 
-    /// States that the shards left out.
+    /// Number of states that the shards left out.
     fn left_out(&self, shards: usize) -> usize {
         self.shards[..shards].iter().map(|shard| shard.left_out).sum()
     }
 
-    /// Characteristic scales of the batch that the shards hold.
+    /// Characteristic scales of the batch in the shards.
     fn scales(&self, shards: usize, n: usize) -> Vec<S> {
         let diagonals: Vec<S> = self.shards[..shards].iter().flat_map(|s| s.diagonal.iter().copied()).collect();
         characteristic_scales(n, &diagonals)
     }
 
-    /// Loss of a whole dataset, no gradient.
+    /// Computes the loss of a whole dataset without gradient.
     pub fn loss(&mut self, weights: &[S], data: &Dataset<S>) -> BatchReport<S> {
         let rows: Vec<u32> = (0..data.len() as u32).collect();
         let shards = self.run(&rows, |shard, rows| {
@@ -544,7 +545,7 @@ impl<S: Scalar> Objective<S> {
             left_out += shard.left_out;
             failure = failure.or(shard.failure);
         }
-        // No state, no loss: the mean of nothing is not 0.
+        // If no state counts, the loss is `NaN`, because the mean of nothing is not 0.
         let loss = residual.value() / S::of_f64((2 * n * (states - left_out)) as f64);
         BatchReport { loss, penalty: penalty.value(), penalised, left_out, failure }
     }

@@ -22,18 +22,18 @@ pub enum StopReason {
 
 /// Result of a run of epochs.
 pub(crate) struct Epochs<S: Scalar, L: Learner<S>> {
-    /// Problem of the training; none if argmin lost it.
+    /// The problem; `None` if argmin lost it.
     pub problem: Option<L::Problem>,
-    /// State of the unknowns besides the weights.
+    /// The learner with its unknowns.
     pub learner: L,
     /// One row per epoch.
     pub history: Vec<Epoch>,
-    /// Parameters of the lowest cost, and that cost.
+    /// Parameters with the lowest cost, and that cost.
     pub best: Option<Vec<S>>,
     pub cost: f64,
     /// Steps of the whole training so far.
     pub steps: usize,
-    /// Seconds by the clock of the run.
+    /// Duration so far, by the clock of the run.
     pub seconds: f64,
     pub stop: StopReason,
 }
@@ -49,8 +49,8 @@ impl<I: State> Observe<I> for Log {
     }
 }
 
-/// Runs all epochs of a solver from `weights`, or the remaining ones of the run `in_progress`, on a thread of its pool: handing work from
-/// there to the pool wakes no thread.
+/// Runs all epochs of a solver from `weights`, or the remaining ones of the run `in_progress`, on a thread of its pool, from which work can
+/// be passed to the pool without waking another thread.
 ///
 /// # Errors
 /// The message of argmin.

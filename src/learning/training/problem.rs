@@ -1,4 +1,4 @@
-//! Training as a problem of argmin's: loss and gradient of a network over a training set.
+//! Training as an argmin problem: loss and gradient of a network over a training set.
 
 use crate::data::Dataset;
 use crate::optimizers::{Method, Moments};
@@ -10,8 +10,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Problem of an argmin run: a network's parameters, its training states and its validation states.
 ///
 /// The cost of parameters is loss plus penalty plus `weight_decay |w|^2 / 2` over all training states, `w` the weights among them, and the
-/// gradient is its derivative; a line search that needs both at one point costs one evaluation. Every solver of argmin, or your own,
-/// accepts it; a batch method calls [`TrainingProblem::step`], and [`Moments::update`] with its gradients.
+/// gradient is its derivative; a line search that needs both at one point costs one evaluation. It works with every solver of argmin and
+/// with your own; a batch method calls [`TrainingProblem::step`], and [`Moments::update`] with its gradients.
 pub struct TrainingProblem<'a, S> {
     evaluator: Mutex<Evaluator<S>>,
     training: &'a Dataset<S>,
@@ -19,7 +19,7 @@ pub struct TrainingProblem<'a, S> {
     weight_decay: f64,
 }
 
-/// The objective, and its result at the last point.
+/// The objective, and its result at the last evaluated parameters.
 struct Evaluator<S> {
     objective: Objective<S>,
     rows: Vec<u32>,
@@ -33,12 +33,13 @@ pub(crate) struct Evaluated<S> {
     pub at: Vec<S>,
     pub cost: S,
     pub gradient: Vec<S>,
-    /// `None` if there is no point yet, or its cost is not finite.
+    /// `None` before the first evaluation, or if the cost is not finite.
     pub report: Option<BatchReport<S>>,
 }
 
 impl<'a, S: Scalar> TrainingProblem<'a, S> {
-    /// The problem to learn from `training`, judged by `validation`; `weight_decay` counts in cost and gradient of the full set.
+    /// Creates the problem of learning from `training`, with the validation set `validation`; `weight_decay` enters cost and gradient of
+    /// the full set.
     pub fn new(
         objective: Objective<S>,
         training: &'a Dataset<S>,
@@ -50,23 +51,23 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         Self { evaluator: Mutex::new(evaluator), training, validation, weight_decay }
     }
 
-    /// States to learn from.
+    /// Training states.
     pub(crate) fn training(&self) -> &'a Dataset<S> {
         self.training
     }
 
-    /// States that choose among parameters.
+    /// Validation states.
     pub(crate) fn validation(&self) -> &'a Dataset<S> {
         self.validation
     }
 
-    /// Moments before the first step of an update rule, with the weight matrices in whose eigenbases SOAP works.
+    /// Creates the moments before the first step of an update rule, with eigenbases of the weight matrices for SOAP.
     pub fn moments(&mut self, method: Method) -> Moments<S> {
         let model = self.objective().model();
         Moments::for_method(method, model.parameters(), model.matrices())
     }
 
-    /// Loss, penalty and gradient of a batch, the training states `rows`, without weight decay; `gradient` is overwritten.
+    /// Computes loss, penalty and gradient of a batch, the training states `rows`, without weight decay; overwrites `gradient`.
     pub fn step(&mut self, weights: &[S], rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
         let training = self.training;
         self.objective().step(weights, training, rows, gradient)
@@ -77,7 +78,7 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         self.lock().objective.loss(weights, self.validation)
     }
 
-    /// Evaluations of the full training set so far.
+    /// Number of evaluations of the full training set so far.
     pub(crate) fn evaluations(&self) -> usize {
         self.lock().evaluations
     }
@@ -87,7 +88,7 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         &mut self.evaluator.get_mut().unwrap_or_else(PoisonError::into_inner).objective
     }
 
-    /// `true` if these parameters are evaluated already.
+    /// `true` if these parameters were the last to be evaluated.
     pub(crate) fn is_known(&self, weights: &[S]) -> bool {
         self.lock().last.is_of(weights)
     }
@@ -101,7 +102,7 @@ impl<'a, S: Scalar> TrainingProblem<'a, S> {
         self.evaluator.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Evaluates unless the point is the last one.
+    /// Evaluates the parameters unless they were the last to be evaluated.
     fn evaluated(&self, weights: &[S]) -> Result<MutexGuard<'_, Evaluator<S>>, Error> {
         let mut guard = self.lock();
         let Evaluator { objective, rows, evaluations, last } = &mut *guard;

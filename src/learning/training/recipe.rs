@@ -1,4 +1,4 @@
-//! From a configuration to a trained network: data, shape, training.
+//! Trains a network by a configuration: data, shape, training.
 
 use crate::configuration::Config;
 use crate::data::{SamplingError, sample_all};

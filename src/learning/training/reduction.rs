@@ -1,10 +1,10 @@
-//! Sums over the shards of a batch in order, so that the numbers do not depend on the number of threads.
+//! Sums over the shards of a batch in a fixed order, so that results do not depend on the number of threads.
 
 use super::thresholds::PARAMETERS_AT_ONCE;
 use crate::scalar::Scalar;
 use rayon::prelude::*;
 
-/// Writes the sum of the gradients of all `shards`, at least one, to `out`; nothing is allocated.
+/// Writes the sum of the gradients of all `shards`, at least one, to `out` without allocation.
 pub(crate) fn sum_gradients<S: Scalar, T: Sync>(
     pool: &rayon::ThreadPool,
     shards: &[T],

@@ -1,4 +1,6 @@
-//! Learning by batches as an argmin solver: one iteration is one epoch, the cost is the validation loss.
+//! Mini-batch training as an argmin solver: one iteration is one epoch, and the cost is the validation loss. argmin sees the validated
+//! parameters (averaged, if averaging is on); the solver keeps the current weights, their moments, the order of the data and the state of
+//! the random generator, which a checkpoint can store between any two steps.
 //!
 //! argmin sees the validated parameters (averaged, if averaging is on); the solver keeps the current weights, their moments, the order of
 //! the data and the random state, which a checkpoint can store between any two steps.
@@ -59,15 +61,15 @@ pub enum StepError {
     /// A state of the batch failed.
     #[error("step {step}: {failure}")]
     State {
-        /// Counted from 1 over all phases.
+        /// Number of the step, counted from 1 over all phases.
         step: usize,
-        /// Which row and why.
+        /// Row of the state, and the reason.
         failure: MechanicsError,
     },
     /// The gradient is not finite.
     #[error("step {step}: the gradient is not finite (norm {norm})")]
     Gradient {
-        /// Counted from 1 over all phases.
+        /// Number of the step, counted from 1 over all phases.
         step: usize,
         /// Its norm.
         norm: f64,
@@ -75,25 +77,25 @@ pub enum StepError {
     /// All steps of an epoch were skipped.
     #[error("epoch {epoch}: every step had to be skipped, the last because {failure}")]
     NoProgress {
-        /// Counted from 1 over all phases.
+        /// Number of the epoch, counted from 1 over all phases.
         epoch: usize,
         /// Failure of the last step.
         failure: MechanicsError,
     },
 }
 
-/// Epochs and the course of their learning rate.
+/// Number of epochs and schedule of the learning rate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LearningRateSchedule {
-    /// Passes through the samples.
+    /// Number of passes through the samples.
     pub epochs: usize,
     /// Learning rate at the start.
     pub rate: f64,
     /// Lowest learning rate.
     pub eta_min: f64,
-    /// Course from one to the other.
+    /// Shape of the schedule.
     pub schedule: Schedule,
-    /// Epochs from highest to lowest rate of `cosine-annealing`.
+    /// For `cosine-annealing`, the number of epochs from the highest to the lowest rate.
     pub t_max: f64,
 }
 
@@ -110,7 +112,7 @@ pub(crate) struct EpochSolver<S, L> {
     optimizer: Optimizer,
     rates: LearningRateSchedule,
     phase_number: usize,
-    /// Epochs before those in its history.
+    /// Number of epochs that are not in its history.
     epochs_before: usize,
     optimizer_state: OptimizerState<S>,
     /// `true` if this run was resumed.
@@ -132,17 +134,17 @@ pub(crate) struct CheckpointWriter<S> {
     pub(crate) seconds: Option<f64>,
 }
 
-/// The run that a phase is part of.
+/// Data of the whole run that contains a phase.
 pub(crate) struct Run<S> {
-    /// Counted from 1.
+    /// Number of the phase, counted from 1.
     pub phase_number: usize,
-    /// Epochs before this phase.
+    /// Number of epochs before this phase.
     pub epoch: usize,
-    /// Those that belong to another history.
+    /// Number of those epochs that belong to another history.
     pub epochs_before: usize,
-    /// Steps before this phase.
+    /// Number of steps before this phase.
     pub step: usize,
-    /// Steps of all phases, if there are other phases.
+    /// Number of steps of all phases, if there are several.
     pub steps: Option<usize>,
     /// Time since training began.
     pub clock: Clock,
@@ -152,14 +154,14 @@ pub(crate) struct Run<S> {
     pub writer: Option<CheckpointWriter<S>>,
 }
 
-/// Samples of a step: at least one, at most all.
+/// Batch size: at least one sample, at most all.
 fn batch(optimizer: &Optimizer, samples: usize) -> usize {
     optimizer.batch.min(samples).max(1)
 }
 
 impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
-    /// A solver for one phase over `samples` training samples, shuffled by `rng`; host it in an argmin `Executor` whose
-    /// state starts with the initial weights and runs for `rates.epochs` iterations.
+    /// Creates a solver for one phase over `samples` training samples, shuffled by `rng`; run it in an argmin `Executor` whose state starts
+    /// with the initial weights and that runs for `rates.epochs` iterations.
     pub fn new(
         learner: L,
         optimizer: Optimizer,
@@ -186,7 +188,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         }
     }
 
-    /// Makes this phase a part of a longer run.
+    /// Embeds this phase in a longer run.
     pub(crate) fn within(self, run: Run<S>) -> Self {
         let Run { phase_number, epoch, epochs_before, step, steps, clock, hooks, writer } = run;
         let optimizer_state = OptimizerState { epoch, step, ..self.optimizer_state };
@@ -219,7 +221,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         self.clock.seconds()
     }
 
-    /// Its history, the failed step if there was one, and the learner.
+    /// Returns its history, the failed step if there was one, and the learner.
     pub(crate) fn finish(self) -> (Vec<Epoch>, Option<StepError>, L) {
         (self.history, self.stopped, self.learner)
     }
@@ -285,7 +287,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         Ok(())
     }
 
-    /// Exponential average, started as a plain mean so that the first weights are forgotten at once.
+    /// Updates the exponential average, which starts as a plain mean so that the initial weights are forgotten quickly.
     fn add_to_average(&mut self) {
         if self.optimizer.averaging == 0.0 {
             return;
@@ -304,7 +306,7 @@ impl<S: Scalar, L: Learner<S>> EpochSolver<S, L> {
         );
     }
 
-    /// The weights that are validated and kept.
+    /// The weights that are validated and stored.
     fn validated(&self) -> &[S] {
         if self.optimizer.averaging == 0.0 { &self.optimizer_state.weights } else { &self.optimizer_state.average }
     }

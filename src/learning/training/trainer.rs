@@ -28,20 +28,21 @@ pub struct Trained<S> {
     pub history: Vec<Epoch>,
     /// Best validation loss, paper convention.
     pub validation_loss: f64,
-    /// Loss on fresh states that were not used for any choice, paper convention.
+    /// Test loss, on fresh states, paper convention.
     pub test: BatchReport<S>,
     /// Why training ended.
     pub stop: StopReason,
     /// Steps taken.
     pub steps: usize,
-    /// States that went through a step.
+    /// Number of training states processed.
     pub states: usize,
     /// Seconds spent in training alone.
     pub seconds: f64,
 }
 
 impl<S: Scalar> Trained<S> {
-    /// The end of this training as a checkpoint, to continue from, as with [`shooting::resume`](crate::shooting::resume).
+    /// Converts the end of this training to a checkpoint that can be continued, for example with
+    /// [`shooting::resume`](crate::shooting::resume).
     #[doc(hidden)]
     pub fn snapshot(&self, config: &Config) -> Snapshot<S> {
         let outcome = Outcome {
@@ -64,30 +65,30 @@ pub enum TrainingError {
     /// The configuration is out of range.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// Phases and sets of training states differ in number.
+    /// The number of phases differs from the number of training sets.
     #[error("expected a set of training states for each of {phases} phases, found {found}")]
     Datasets {
         /// Phases of the configuration.
         phases: usize,
-        /// Sets given.
+        /// Number of training sets.
         found: usize,
     },
     /// Threads could not be started.
     #[error(transparent)]
     Threads(#[from] ThreadsError),
-    /// The host of the optimiser failed.
+    /// The solver of argmin failed.
     #[error("the optimiser failed: {0}")]
     Optimizer(String),
-    /// No epoch gave a finite validation loss.
+    /// No epoch had a finite validation loss.
     #[error("no epoch gave a finite validation loss{}", .0.map(|e| format!(": {e}")).unwrap_or_default())]
     NothingLearned(Option<StepError>),
 }
 
-/// Where a training keeps its checkpoints, and the checkpoint that it continues from.
+/// Checkpoints of a training, and the checkpoint from which it continues.
 pub struct ResumeOptions<S> {
     /// Checkpoint writer, if enabled.
     pub checkpoints: Option<Arc<CheckpointManager>>,
-    /// The checkpoint that [`CheckpointManager::restore`] found, or nothing for a training from its beginning.
+    /// The checkpoint that [`CheckpointManager::restore`] found; `None` for a new training.
     pub start: Option<Snapshot<S>>,
 }
 
@@ -136,7 +137,7 @@ pub fn resume<S: Scalar>(
     });
     let (pool, clock) = (objective::threads(threads)?, Clock::after(seconds));
     let training = Training { config, architecture, penalty, data: &data, pool, hooks, checkpoints, clock };
-    // The checkpoint of a training that is over belongs to the next stage.
+    // If the training has ended, its checkpoint belongs to the next stage.
     let shooting = in_progress.as_ref().is_some_and(|in_progress| in_progress.learner.is_some());
     let mut stop = training.run_phases(&mut outcome, in_progress)?;
     if stop == StopReason::Finished && training.refine(&mut outcome)? {
@@ -155,7 +156,7 @@ pub fn resume<S: Scalar>(
     Ok(Trained { weights, history, validation_loss, test, stop, steps, states, seconds })
 }
 
-/// Everything that stays the same during a training.
+/// Data that remain the same during a training.
 struct Training<'a, S> {
     config: &'a Config,
     architecture: &'a Architecture,
@@ -173,15 +174,14 @@ impl<S: Scalar> Training<'_, S> {
         Objective::on(Arc::clone(&self.pool), self.architecture.model(), self.penalty)
     }
 
-    /// Saves the results so far between two phases, if checkpoints are enabled.
+    /// Saves a checkpoint between two phases, if checkpoints are enabled.
     fn save(&self, outcome: &Outcome<S>) {
         if let Some(checkpoints) = &self.checkpoints {
             checkpoints.save(self.clock.seconds(), outcome, None);
         }
     }
 
-    /// Runs the remaining phases, the first of them from its checkpoint if there is one; adds their results and returns why the last one
-    /// ended.
+    /// Runs the remaining phases, the first from its checkpoint if there is one; adds their results and returns why the last one ended.
     fn run_phases(
         &self,
         outcome: &mut Outcome<S>,
@@ -219,7 +219,7 @@ impl<S: Scalar> Training<'_, S> {
         Ok(StopReason::Finished)
     }
 
-    /// Refines the result of finished phases by L-BFGS in double precision, if the configuration says so and that is still to be done;
+    /// Refines the result of finished phases by L-BFGS in double precision, if the configuration requests it and it is not done yet;
     /// returns `true` if it was interrupted.
     fn refine(&self, outcome: &mut Outcome<S>) -> Result<bool, TrainingError> {
         let (Some(settings), Some(training)) = (&self.config.lbfgs, self.data.training.last()) else {
@@ -251,12 +251,12 @@ impl<S: Scalar> Training<'_, S> {
     }
 }
 
-/// States in double precision, copied only where they are in another.
+/// Converts states to double precision; copies them only if they have another precision.
 fn in_double<S: Scalar>(data: &Dataset<S>) -> Cow<'_, Dataset<f64>> {
     (data as &dyn Any).downcast_ref().map_or_else(|| Cow::Owned(data.cast()), Cow::Borrowed)
 }
 
-/// Runs one phase, from its beginning or from its checkpoint; adds its results and returns why it ended.
+/// Runs one phase, from its start or from its checkpoint; adds its results and returns why it ended.
 ///
 /// Its best parameters are kept if they beat those of earlier phases.
 fn run_phase<'a, S: Scalar>(

@@ -1,4 +1,4 @@
-//! Gradients of penalties: mixed directions of the states that violate, evaluated in full chunks of their own.
+//! Gradients of penalties: collects mixed directions of the states that violate, and evaluates them in full chunks.
 
 use crate::linalg::Violation;
 use crate::network::{Dynamics, Model};
@@ -8,7 +8,7 @@ use crate::tape::{Depth, MixedDirections, STATES};
 /// States whose mass matrices have a penalty, and the directions of its gradient.
 pub(crate) struct Violations<S> {
     model: Model<S>,
-    /// Created at the first violation.
+    /// Created when the first violation occurs.
     dynamics: Option<Dynamics<S>>,
     q: Vec<S>,
     v: Vec<S>,
@@ -43,8 +43,7 @@ impl<S: Scalar> Violations<S> {
         self.directions.clear(false);
     }
 
-    /// Counts the violation of a state `(q, v)` and keeps its directions: `G = sum gamma u u^T` has `s = lambda gamma u`,
-    /// `t = u`.
+    /// Adds the violation of a state `(q, v)` and stores its directions: `G = sum gamma u u^T` has `s = lambda gamma u`, `t = u`.
     pub fn push(&mut self, (q, v): (&[S], &[S]), violation: &Violation<S>, lambda: S) {
         if violation.gamma.is_empty() {
             return;

@@ -1,4 +1,4 @@
-//! The bytes of a checkpoint.
+//! Serialization of checkpoints.
 
 use super::fingerprint::{Fingerprint, Saved};
 use super::{OptimizerState, Outcome, PhaseState, Snapshot};
@@ -10,7 +10,7 @@ use crate::training::thresholds::LARGEST_COUNT;
 use serde::{Deserialize, Serialize};
 
 const CHECKPOINT: FileKind = FileKind { name: "checkpoint", key: "lnn-checkpoint", format: 1 };
-/// The only tensor: the state as serde writes it.
+/// Name of the only tensor: the serialized state.
 const STATE: &str = "state";
 
 /// Summary of a checkpoint, read without its state.
@@ -31,7 +31,7 @@ impl Header {
     }
 }
 
-/// The bytes of a checkpoint.
+/// Serializes a checkpoint.
 ///
 /// # Errors
 /// A number type that files do not know.
@@ -55,12 +55,12 @@ pub(crate) fn encode<S: Scalar>(
     pack(&CHECKPOINT, &header, vec![Tensor::bytes(STATE.to_string(), state)])
 }
 
-/// Only the description, of an intact file.
+/// Reads only the header of an intact file.
 pub(crate) fn decode_header(bytes: &[u8]) -> Result<Header, ModelFileError> {
     unpack(&CHECKPOINT, bytes).map(|(header, _)| header)
 }
 
-/// Description and content of a whole checkpoint; never panics.
+/// Reads header and content of a checkpoint; never panics.
 pub(crate) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), ModelFileError> {
     let (header, file) = unpack::<Header>(&CHECKPOINT, bytes)?;
     file.check_names(|name| name == STATE)?;
@@ -72,7 +72,7 @@ pub(crate) fn decode<S: Scalar>(bytes: &[u8]) -> Result<(Header, Snapshot<S>), M
     Ok((header, Snapshot { seconds: seconds.max(0.0), outcome, in_progress }))
 }
 
-/// Checks that no count is beyond any training.
+/// Checks that no count is implausibly large.
 fn check_counts(counts: impl IntoIterator<Item = u64>) -> Result<(), &'static str> {
     if counts.into_iter().any(|count| count > LARGEST_COUNT) { Err("a count is beyond any training") } else { Ok(()) }
 }
@@ -84,7 +84,7 @@ impl<S> Outcome<S> {
 }
 
 impl<S: Scalar> PhaseState<S> {
-    /// Checks that the parts fit each other and a network of `parameters` weights.
+    /// Checks that the parts are consistent with each other and with a network of `parameters` weights.
     fn check(&self, parameters: usize) -> Result<(), &'static str> {
         let OptimizerState { order, weights, moments, average, iteration, means, .. } = &self.optimizer_state;
         let counts = [
@@ -94,7 +94,7 @@ impl<S: Scalar> PhaseState<S> {
             self.optimizer_state.batch,
         ];
         check_counts(counts.into_iter().chain(means.counts()).map(|count| count as u64).chain([*iteration]))?;
-        // A learner with a state of its own may have no average.
+        // A learner with its own state may lack an average.
         let averaged = average.len() == parameters || (self.learner.is_some() && average.is_empty());
         if [weights, &self.best].iter().any(|numbers| numbers.len() != parameters) || !averaged {
             return Err("the weights of a step are not those of the network");

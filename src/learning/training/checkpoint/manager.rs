@@ -1,4 +1,4 @@
-//! Checkpoints in a directory: when to write one, the newest and the previous one, continuing from either.
+//! Keeps the newest and the previous checkpoint in a directory, and decides when to write one.
 
 use super::fingerprint::{Fingerprint, Saved};
 use super::format::{Header, decode, decode_header, encode};
@@ -21,9 +21,9 @@ pub const PREVIOUS: &str = "checkpoint.previous.safetensors";
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CheckpointInterval {
-    /// When this many epochs have ended since the last.
+    /// A checkpoint is due after this many epochs.
     Epochs(usize),
-    /// At the first step after this many seconds since the last; later if writing would take more than a hundredth of the time.
+    /// A checkpoint is due after this many seconds; later if writing takes more than a hundredth of the time.
     Seconds(f64),
 }
 
@@ -31,7 +31,7 @@ pub enum CheckpointInterval {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
-    /// No checkpoint in the directory.
+    /// The directory contains no checkpoint.
     #[error("there is no checkpoint")]
     Missing,
     /// Neither the newest checkpoint nor the previous one can be read.
@@ -42,13 +42,13 @@ pub enum CheckpointError {
         /// Problem of the previous one.
         previous: Box<ModelFileError>,
     },
-    /// Written by another version.
+    /// Another version wrote the checkpoint.
     #[error("{0}")]
     Version(Box<ModelFileError>),
-    /// The checkpoint is of another configuration.
+    /// The checkpoint has another configuration.
     #[error("the checkpoint is of another configuration")]
     Config {
-        /// The checkpoint's.
+        /// The configuration of the checkpoint.
         saved: String,
     },
     /// The states differ from those of the checkpoint.
@@ -77,14 +77,14 @@ pub struct CheckpointManager {
 struct State {
     /// When the last checkpoint was written or read, and the epochs completed then.
     last: Option<(Instant, usize)>,
-    /// Duration.
+    /// Time that the last writing took.
     cost: Duration,
     /// `true` if the newest checkpoint is intact and may become the previous one.
     keep: bool,
 }
 
 impl CheckpointManager {
-    /// Checkpoints of this training in `directory`.
+    /// Manages the checkpoints of this training in `directory`.
     pub fn new(files: Arc<dyn Files>, directory: &Path, every: CheckpointInterval, identity: Fingerprint) -> Self {
         let state = State { last: None, cost: Duration::ZERO, keep: true };
         Self { files, directory: directory.to_path_buf(), every, identity, state: Mutex::new(state) }
@@ -112,7 +112,7 @@ impl CheckpointManager {
         }
     }
 
-    /// Writes a checkpoint; if that fails, the previous one is kept, training continues, and the log has a warning.
+    /// Writes a checkpoint. If that fails, the previous one is kept, training continues, and a warning is logged.
     pub(crate) fn save<S: Scalar>(&self, seconds: f64, outcome: &Outcome<S>, in_progress: Option<&PhaseState<S>>) {
         let began = Instant::now();
         let mut state = self.state();
@@ -129,8 +129,8 @@ impl CheckpointManager {
         tracing::info!(epochs, cost = state.cost.as_secs_f64(), "checkpoint");
     }
 
-    /// The newest intact checkpoint of the same configuration and data, for a network of `parameters` weights and phases over `states`
-    /// states.
+    /// Reads the newest intact checkpoint of the same configuration and data, for a network of `parameters` weights and phases over
+    /// `states` states.
     ///
     /// # Errors
     /// [`CheckpointError`].
@@ -146,7 +146,7 @@ impl CheckpointManager {
         if !names.is_empty() || header.identity.data.len() != self.identity.data.len() {
             return Err(CheckpointError::Data(names.join(", ")));
         }
-        // After the data: a configuration may have been made for them.
+        // Checked after the data, because a configuration may have been derived from them.
         if header.identity.config != self.identity.config {
             return Err(CheckpointError::Config { saved: header.identity.config });
         }
@@ -154,7 +154,7 @@ impl CheckpointManager {
             let problem = format!("{} weights, the network has {parameters}", snapshot.outcome.weights.len());
             return Err(CheckpointError::Data(problem));
         }
-        // The segments of multiple shooting are counted where they are cut.
+        // The number of segments is only known after multiple shooting has cut the trajectories.
         if let Some(order) = snapshot.in_progress.as_ref().map(|in_progress| in_progress.optimizer_state.order.len())
             && order != states
             && !snapshot.is_shooting()
@@ -187,7 +187,7 @@ pub fn remove_checkpoints(files: &dyn Files, directory: &Path) -> std::io::Resul
     Ok(())
 }
 
-/// The training whose checkpoint is in a directory.
+/// Reads the training whose checkpoint is in a directory.
 ///
 /// # Errors
 /// [`CheckpointError`] if none is intact.

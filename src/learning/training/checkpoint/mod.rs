@@ -1,9 +1,8 @@
 //! Checkpoints: everything a training needs to continue as if it had never stopped.
 //!
-//! A checkpoint is a safetensors file of the same make as a model file ([`container`](crate::storage::container)), metadata key
-//! `lnn-checkpoint`. Its description contains the configuration as text, checksums of the data, and the completed epochs and steps. Its
-//! only tensor `state` is the [`Snapshot`] as serde writes it, with exact numbers in the precision of the training: the same state gives
-//! the same bytes.
+//! A checkpoint is a safetensors file like a model file ([`container`](crate::storage::container)), metadata key `lnn-checkpoint`. Its
+//! description contains the configuration as text, checksums of the data, and the completed epochs and steps. Its only tensor `state` is
+//! the [`Snapshot`] as serde writes it, with exact numbers in the precision of the training: the same state gives the same bytes.
 //!
 //! A phase is stored to the step: the next batch of the epoch, the sums over its batches so far and the random generator are part of the
 //! state. A learner that fits more than the weights, as [multiple shooting](crate::shooting) fits the starts of its segments, writes and
@@ -36,7 +35,7 @@ pub struct Snapshot<S> {
 }
 
 impl<S: Scalar> Snapshot<S> {
-    /// The bytes of a checkpoint of this training.
+    /// Serializes this training as a checkpoint.
     ///
     /// # Errors
     /// A number type that files do not know.
@@ -54,15 +53,15 @@ impl<S: Scalar> Snapshot<S> {
 }
 
 impl<S> Snapshot<S> {
-    /// The beginning of a training from these weights, such as those of a model that is trained further.
+    /// Creates the start of a training from these weights, such as those of a model that is trained further.
     pub fn beginning_with(weights: Vec<S>) -> Self {
         Self { seconds: 0.0, outcome: Outcome::none(weights), in_progress: None }
     }
-    /// Steps taken so far; during multiple shooting, its steps.
+    /// Number of steps so far; during multiple shooting, its own steps.
     pub fn steps(&self) -> usize {
         self.in_progress.as_ref().map_or(self.outcome.steps, |in_progress| in_progress.optimizer_state.step)
     }
-    /// `true` if multiple shooting is under way, the training before it being over.
+    /// `true` during multiple shooting, after the supervised training has ended.
     pub fn is_shooting(&self) -> bool {
         self.in_progress.as_ref().is_some_and(|in_progress| in_progress.learner.is_some())
     }
@@ -80,21 +79,21 @@ pub(crate) struct Outcome<S> {
     pub phases: usize,
     /// `true` if L-BFGS has ended too.
     pub refined: bool,
-    /// Parameters of the best epoch; the initial ones if there is none.
+    /// Parameters of the best epoch; the initial ones before the first epoch.
     #[serde(with = "numbers")]
     pub weights: Vec<S>,
-    /// Its validation loss, infinite if there is none.
+    /// Validation loss of the best epoch; infinite before the first epoch.
     pub validation_loss: f64,
     /// One row per epoch.
     pub history: Vec<Epoch>,
     /// Steps taken.
     pub steps: usize,
-    /// States that went through a step.
+    /// Number of training states processed.
     pub states: usize,
 }
 
 impl<S> Outcome<S> {
-    /// Before the first phase.
+    /// Creates the outcome before the first phase.
     pub fn none(weights: Vec<S>) -> Self {
         let (phases, steps, states) = (0, 0, 0);
         let (validation_loss, history) = (f64::INFINITY, Vec::new());
@@ -102,33 +101,33 @@ impl<S> Outcome<S> {
     }
 }
 
-/// A phase, or multiple shooting, between two of its steps.
+/// Progress of a phase, or of multiple shooting, between two of its steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "S: Scalar")]
 pub(crate) struct PhaseState<S> {
     pub optimizer_state: OptimizerState<S>,
     /// One row per epoch of the phase.
     pub history: Vec<Epoch>,
-    /// Parameters of the phase's best epoch; those it started with if there is none.
+    /// Parameters of the phase's best epoch; the initial ones before its first epoch.
     #[serde(with = "numbers")]
     pub best: Vec<S>,
-    /// Their validation loss, infinite if there is none.
+    /// Validation loss of those parameters; infinite before the first epoch.
     pub best_loss: f64,
     /// The best epoch of the phase, counted from 0.
     pub best_epoch: u64,
-    /// State of the learner besides the weights, in its own bytes; `None` if it has none, as in a phase.
+    /// Serialized state of the learner except the weights; `None` if it has none, as in a phase.
     pub learner: Option<Vec<u8>>,
 }
 
-/// State that moves from step to step within a phase; the states of multiple shooting are segments.
+/// State that changes with every step of a phase; in multiple shooting, its states are segments.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "S: Scalar")]
 pub(crate) struct OptimizerState<S> {
-    /// Draws the order of every epoch.
+    /// Generator that shuffles the data in every epoch.
     pub rng: RandomGenerator,
-    /// States in the order of the epoch.
+    /// Order of the states in this epoch.
     pub order: Vec<u32>,
-    /// The weights that move.
+    /// The current weights.
     #[serde(with = "numbers")]
     pub weights: Vec<S>,
     /// Moments of their gradients.
@@ -136,7 +135,7 @@ pub(crate) struct OptimizerState<S> {
     /// Running average of the weights.
     #[serde(with = "numbers")]
     pub average: Vec<S>,
-    /// Steps in it.
+    /// Number of steps in the average.
     pub averaged_steps: usize,
     /// Epochs completed in this phase.
     pub iteration: u64,
@@ -144,14 +143,14 @@ pub(crate) struct OptimizerState<S> {
     pub epoch: usize,
     /// Steps taken in all phases.
     pub step: usize,
-    /// Batches of the epoch that are done; 0 before the order is drawn.
+    /// Number of finished batches of the epoch; 0 before the data are shuffled.
     pub batch: usize,
-    /// Sums over them.
+    /// Sums over those batches.
     pub means: Means,
 }
 
 impl<S: Scalar> OptimizerState<S> {
-    /// Before the first step of a phase over `states` states.
+    /// Creates the state before the first step of a phase over `states` states.
     pub fn new(rng: RandomGenerator, states: usize) -> Self {
         Self {
             rng,
@@ -177,7 +176,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Starts now, after `before` seconds before it was resumed.
+    /// Starts the clock with `before` seconds from earlier runs.
     pub fn after(before: f64) -> Self {
         Self { since: Instant::now(), before }
     }
