@@ -1,4 +1,4 @@
-//! A Lagrangian, however made: its terms and its motion.
+//! Lagrangian mechanics of hand-written, described and learned systems: terms and motion.
 //!
 //! | module | contents |
 //! |---|---|

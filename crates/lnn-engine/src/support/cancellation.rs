@@ -1,24 +1,24 @@
-//! Long searches: a flag ends them, and they report how far they are.
+//! Cancellation of long searches with a flag, and reports of their progress.
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Shortest time between two reports: often enough to show that the search continues.
+/// Shortest time between two reports, which is often enough to show progress.
 const EVERY: Duration = Duration::from_millis(200);
 
-/// How far a search is.
+/// The progress of a search.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct SearchProgress {
     /// The current stage, such as `short segments`.
     pub stage: &'static str,
-    /// Iterations of this stage.
+    /// Number of iterations in this stage.
     pub iteration: usize,
-    /// Root mean square residual in units of noise, once there is one.
+    /// Root mean square residual in units of noise, once it is known.
     pub residual: Option<f64>,
-    /// Pieces of work that are done, such as batches of segments.
+    /// Number of finished pieces of work, such as batches of segments.
     pub pieces: u64,
 }
 
@@ -33,7 +33,7 @@ impl fmt::Display for SearchProgress {
     }
 }
 
-/// The flag was raised: there is no result.
+/// The error of a search that the flag has ended, so that there is no result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cancelled;
 
@@ -67,19 +67,19 @@ pub struct Cancellation {
 }
 
 impl Cancellation {
-    /// Ended by a flag.
+    /// Creates a cancellation with a given flag.
     pub fn by(flag: &Arc<AtomicBool>) -> Self {
         Self { flag: Arc::clone(flag), reports: None }
     }
 
-    /// Adds a receiver of reports, which is called from several threads, at most five times a second.
+    /// Adds a receiver of reports, which is called from several threads at most five times a second.
     #[must_use]
     pub fn reporting(self, to: impl Fn(SearchProgress) + Send + Sync + 'static) -> Self {
         let reports = Reports { to: Box::new(to), now: Mutex::default() };
         Self { reports: Some(Arc::new(reports)), ..self }
     }
 
-    /// A separate cancellation that is raised with this one, or after a time. The search notices it when it reports.
+    /// Returns a separate cancellation that is raised with this one, or after a time limit. The search notices the limit when it reports.
     #[must_use]
     pub fn within(&self, limit: Duration) -> Self {
         let (outer, inner, started) = (self.clone(), Self::default(), Instant::now());
@@ -92,7 +92,7 @@ impl Cancellation {
         })
     }
 
-    /// The flag.
+    /// Returns the flag.
     pub fn flag(&self) -> &AtomicBool {
         &self.flag
     }
@@ -102,12 +102,12 @@ impl Cancellation {
         self.flag.store(true, Ordering::SeqCst);
     }
 
-    /// `true` once the flag is raised.
+    /// Returns `true` once the flag is raised.
     pub fn is_cancelled(&self) -> bool {
         self.flag.load(Ordering::SeqCst)
     }
 
-    /// Continues unless the flag was raised.
+    /// Fails once the flag is raised.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -115,18 +115,19 @@ impl Cancellation {
         if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 
-    /// A stage of the search begins.
+    /// Reports the start of a stage of the search.
     pub fn stage(&self, stage: &'static str) {
         self.report(|now| *now = SearchProgress { stage, pieces: now.pieces, ..SearchProgress::default() });
     }
 
-    /// An iteration of the stage begins at a residual in units of noise; `false` once the flag is raised, when the loop is to end.
+    /// Reports the start of an iteration, with the residual in units of noise; returns `false` once the flag is raised, and the loop must
+    /// end.
     pub fn iterate(&self, residual: f64) -> bool {
         self.report(|now| (now.iteration, now.residual) = (now.iteration + 1, Some(residual)));
         !self.is_cancelled()
     }
 
-    /// A piece of work begins; `false` once the flag is raised, when the loop is to end.
+    /// Reports the start of a piece of work; returns `false` once the flag is raised, and the loop must end.
     pub fn go_on(&self) -> bool {
         self.report(|now| now.pieces += 1);
         !self.is_cancelled()
@@ -143,7 +144,7 @@ impl Cancellation {
     }
 }
 
-/// Searches with the same settings are equal, whatever may end them.
+/// The comparison of settings ignores cancellations: all of them are equal.
 impl PartialEq for Cancellation {
     fn eq(&self, _: &Self) -> bool {
         true

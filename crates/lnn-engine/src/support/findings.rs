@@ -1,4 +1,4 @@
-//! Reports of results, as sentences and tables: a result writes its report, and a terminal, a page or a notebook shows it.
+//! Reports of results as sentences and tables, which can be shown in a terminal, a page or a notebook.
 
 use crate::names::{WIDTH, cut, cut_hard, width, wrap_text};
 use alloc::format;
@@ -10,24 +10,24 @@ use core::fmt::{Display, Formatter, Result};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Finding {
-    /// The most important result in a sentence, and a few quantities with their values.
+    /// The most important result: a sentence, and a few quantities with their values.
     Summary {
         /// The sentence.
         sentence: String,
         /// Quantities and values.
         rows: Vec<[String; 2]>,
     },
-    /// The subject of the following items.
+    /// A heading for the following items.
     Heading(String),
     /// A sentence, or a line of a list.
     Line(String),
-    /// Text to copy, such as a formula or a command: it is never cut.
+    /// Text to copy, such as a formula or a command, which is never wrapped.
     Code(String),
     /// The end of a paragraph.
     Gap,
-    /// A table: the meaning of its columns, and its rows.
+    /// A table: column headers and rows.
     Table {
-        /// A word or two for each column.
+        /// One or two words for each column.
         headers: Vec<String>,
         /// Rows, which may be shorter than the headers.
         rows: Vec<Vec<String>>,
@@ -36,7 +36,7 @@ pub enum Finding {
 
 /// The report of a result, in reading order.
 ///
-/// [`Display`] writes it for a terminal, in lines of at most 120 characters; the parts are there for other media.
+/// [`Display`] formats it for a terminal, in lines of at most 120 characters; other media use the parts.
 ///
 /// ```
 /// use lnn::findings::Findings;
@@ -69,7 +69,7 @@ impl Findings {
         self
     }
 
-    /// Adds sentences, one each.
+    /// Adds several sentences, each as a line.
     pub fn lines<T: Into<String>>(&mut self, texts: impl IntoIterator<Item = T>) -> &mut Self {
         self.parts.extend(texts.into_iter().map(|text| Finding::Line(text.into())));
         self
@@ -87,7 +87,7 @@ impl Findings {
         self
     }
 
-    /// Adds a table; nothing without rows.
+    /// Adds a table, unless it has no rows.
     pub fn table<H: ToString, C: ToString, R: IntoIterator<Item = C>>(
         &mut self,
         headers: &[H],
@@ -107,7 +107,7 @@ impl Findings {
         self
     }
 
-    /// The parts in order.
+    /// Returns the parts in order.
     pub fn parts(&self) -> &[Finding] {
         &self.parts
     }
@@ -134,16 +134,16 @@ impl Display for Findings {
     }
 }
 
-/// Blanks between two columns.
+/// Number of spaces between two columns.
 const GAP: usize = 2;
 /// Smallest width to which a column of words is narrowed.
 const LEAST: usize = 24;
 
-/// Text of a table with aligned columns: numbers to the right, words to the left, no trailing blanks, lines of at most
-/// `WIDTH` characters.
+/// Formats a table with aligned columns: numbers to the right, words to the left, without trailing spaces, in lines of at most `WIDTH`
+/// characters.
 ///
-/// In a wider table the headers are wrapped at spaces, then the longest words; finally it is split into several tables below each other,
-/// which begin with the same column. Rows may be shorter than the header. A cell counts as a number if it begins with a digit, a sign or a
+/// In a wider table the headers are wrapped at spaces, then the longest words; finally it is split into several tables, each of which
+/// starts with the same column. Rows may be shorter than the header. A cell counts as a number if it begins with a digit, a sign or a
 /// point.
 pub fn text_table<H: AsRef<str>, C: AsRef<str>>(headers: &[H], rows: &[Vec<C>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(headers.len());
@@ -181,34 +181,34 @@ impl Column {
         Self { header: headers.get(k).map_or("", AsRef::as_ref).to_string(), cells, numeric }
     }
 
-    /// Width of the unwrapped cells.
+    /// Returns the width of the unwrapped cells.
     fn cells(&self) -> usize {
         self.cells.iter().map(|cell| width(cell)).max().unwrap_or(0)
     }
 
-    /// Width of the cells and of the header in one line.
+    /// Returns the width of the cells and of the header in one line.
     fn natural(&self) -> usize {
         self.cells().max(width(&self.header))
     }
 
-    /// Width of the longest word of the header.
+    /// Returns the width of the longest word of the header.
     fn word(&self) -> usize {
         self.header.split(' ').map(width).max().unwrap_or(0)
     }
 
-    /// Least width: numbers are never cut.
+    /// Returns the smallest width; numbers are never wrapped.
     fn least(&self) -> usize {
         let cells = if self.numeric { self.cells() } else { self.cells().min(LEAST) };
         cells.max(self.word())
     }
 
-    /// Lines of the header at a width.
+    /// Wraps the header to a width.
     fn header(&self, at: usize) -> Vec<String> {
         cut(&self.header, at)
     }
 }
 
-/// Widths of adjacent columns.
+/// Computes the widths of adjacent columns.
 fn widths(columns: &[&Column]) -> Vec<usize> {
     let most = WIDTH.saturating_sub(GAP * (columns.len() - 1));
     let natural: Vec<usize> = columns.iter().map(|column| column.natural()).collect();
@@ -216,13 +216,13 @@ fn widths(columns: &[&Column]) -> Vec<usize> {
         return natural;
     }
     let mut widths: Vec<usize> = columns.iter().map(|column| column.cells().max(column.word())).collect();
-    // Words are wrapped in the widest column, as long as it is the widest.
+    // Always narrow the widest column.
     for _ in most..widths.iter().sum::<usize>() {
         let narrowed = (0..columns.len()).filter(|&k| widths[k] > columns[k].least()).max_by_key(|&k| widths[k]);
         let Some(k) = narrowed else { break };
         widths[k] -= 1;
     }
-    // Headers get the remaining width, starting with those of most lines.
+    // Headers get the remaining width, starting with those of the most lines.
     loop {
         let used: usize = widths.iter().sum();
         let wider = |k: usize| {
@@ -238,13 +238,13 @@ fn widths(columns: &[&Column]) -> Vec<usize> {
     }
 }
 
-/// Adjacent columns.
+/// Formats adjacent columns.
 fn block_text(columns: &[&Column]) -> String {
     let widths = widths(columns);
     let mut text = String::new();
     let headers: Vec<Vec<String>> = columns.iter().zip(&widths).map(|(column, &at)| column.header(at)).collect();
     let lines = headers.iter().map(Vec::len).max().unwrap_or(1);
-    // Headers of fewer lines are at the bottom.
+    // Headers of fewer lines are aligned at the bottom.
     let header =
         |k: usize, line: usize| (line + headers[k].len()).checked_sub(lines).map(|line| headers[k][line].as_str());
     for line in 0..lines {
@@ -321,7 +321,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 4, "{text}");
         assert!(lines[2].starts_with("---") && lines[3].split_whitespace().count() == 8, "{text}");
-        // A header of fewer lines is at the bottom.
+        // A header of fewer lines is aligned at the bottom.
         let text = text_table(&[&headers[..], &["n".to_string()]].concat(), &[vec!["0.0123"; 9]]);
         assert!(text.lines().nth(2).unwrap().ends_with(" n") && widest(&text) <= WIDTH, "{text}");
     }

@@ -1,4 +1,4 @@
-//! Common base of all floors above: cancellation, names in messages, files, memory.
+//! The base of all other modules: cancellation, names in messages, files, memory.
 //!
 //! | module | contents |
 //! |---|---|

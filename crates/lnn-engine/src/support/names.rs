@@ -1,11 +1,11 @@
-//! Names and numbers in messages: the known name nearest to a mistyped one, wrapped and single-line texts, counts, digits, names of result
+//! Names and numbers in messages: suggestions for mistyped names, wrapped and single-line texts, counts, digits, and names of result
 //! columns.
 
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-/// The candidate that fewest edits (insert, delete, replace, swap neighbours) turn `name` into; none if each needs edits to more than a
-/// third of the letters: `y` is not near `x`, nor `m3` near `m1`.
+/// Returns the candidate with the fewest edits (insert, delete, replace, swap neighbours) from `name`; `None` if each needs edits to more
+/// than a third of the letters: `y` is not near `x`, nor `m3` near `m1`.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name: Vec<char> = name.to_lowercase().chars().take(64).collect();
     let near = |candidate: &'a str| {
@@ -16,12 +16,12 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     candidates.into_iter().filter_map(near).min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
 }
 
-/// `1 row`, `2 rows`: a count with its noun in the singular or the plural.
+/// Formats a count with its noun in the singular or the plural: `1 row`, `2 rows`.
 pub fn pluralize(count: usize, singular: &str, plural: &str) -> String {
     format!("{count} {}", if count == 1 { singular } else { plural })
 }
 
-/// `unknown WHAT "NAME"` with the nearest candidate, or all of them when none is near.
+/// Formats `unknown WHAT "NAME"` with the nearest candidate, or with all of them if none is near.
 pub fn unknown<'a>(what: &str, name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
     let shown: String = name.chars().take(40).collect();
     match nearest(name, candidates.clone()) {
@@ -36,7 +36,7 @@ pub fn unknown<'a>(what: &str, name: &str, candidates: impl IntoIterator<Item = 
     }
 }
 
-/// Optimal string alignment distance (Damerau 1964, Levenshtein 1966).
+/// Computes the optimal string alignment distance (Damerau 1964, Levenshtein 1966).
 fn edits(a: &[char], b: &[char]) -> usize {
     let mut before = vec![0; b.len() + 1];
     let mut above: Vec<usize> = (0..=b.len()).collect();
@@ -55,8 +55,8 @@ fn edits(a: &[char], b: &[char]) -> usize {
     above[b.len()]
 }
 
-/// Lines joined by a space, with control characters escaped: an error is one line, whatever a file name contains. Numbers of system errors
-/// are left out, and numbers of many digits get an exponent.
+/// Joins lines with spaces and escapes control characters, so that an error is one line, whatever a file name contains. Removes the numbers
+/// of system errors, and writes long numbers with an exponent.
 pub fn one_line(text: &str) -> String {
     let joined = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
     short_numbers(&without_error_numbers(&joined)).chars().fold(String::with_capacity(joined.len()), |mut line, c| {
@@ -69,7 +69,7 @@ pub fn one_line(text: &str) -> String {
     })
 }
 
-/// A text without the ` (os error 28)` that Rust adds to the words of the system.
+/// Removes the ` (os error 28)` that Rust adds to the message of the system.
 fn without_error_numbers(text: &str) -> String {
     let mut parts = text.split(" (os error ");
     let first = parts.next().unwrap_or_default().to_string();
@@ -79,10 +79,10 @@ fn without_error_numbers(text: &str) -> String {
     })
 }
 
-/// Digits at and above which a number is written with an exponent; the largest whole number of 64 bits has one fewer.
+/// Numbers with at least this many digits are written with an exponent; the largest 64-bit integer has one fewer.
 const MOST_DIGITS: usize = 21;
 
-/// A text whose long decimal numbers have exponents; digits inside words and paths stay.
+/// Writes long decimal numbers in a text with exponents, but not digits inside words and paths.
 fn short_numbers(text: &str) -> String {
     let is_part = |c: char| c.is_ascii_digit() || c == '.';
     let mut whole = String::with_capacity(text.len());
@@ -91,7 +91,7 @@ fn short_numbers(text: &str) -> String {
         let length = rest[start..].find(|c| !is_part(c)).unwrap_or(rest.len() - start);
         let (before, number, after) = (&rest[..start], &rest[start..start + length], &rest[start + length..]);
         let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || "_/\\-".contains(c));
-        // A minus sign without a word before it is not part of a word.
+        // A minus sign that does not follow a word is not part of a word.
         let left = before.strip_suffix('-').filter(|left| !inside(left.chars().last())).unwrap_or(before);
         let apart = length > MOST_DIGITS && !inside(left.chars().last()) && !inside(after.chars().next());
         whole.push_str(before);
@@ -104,8 +104,8 @@ fn short_numbers(text: &str) -> String {
     whole + rest
 }
 
-/// The first coordinate with the name of another column, and the meaning of that column: results have the time as `t`, or as `tau` if a
-/// coordinate is called `t`, the energy, and for every coordinate `NAME_dot`, `NAME_ddot` and `NAME_force`.
+/// Returns the first coordinate whose name is used for another column, and the meaning of that column. Result columns are the time `t`, or
+/// `tau` if a coordinate is called `t`, the energy, and for every coordinate `NAME_dot`, `NAME_ddot` and `NAME_force`.
 pub fn taken_column(coordinates: &[&str]) -> Option<(usize, String)> {
     coordinates.iter().enumerate().find_map(|(index, name)| {
         let of_another = |end: &str| name.strip_suffix(end).filter(|other| coordinates.contains(other));
@@ -122,13 +122,13 @@ pub fn taken_column(coordinates: &[&str]) -> Option<(usize, String)> {
     })
 }
 
-/// A number with three significant digits: `0.0196`, `12.3`, `4.30e-5`. See [`rounded`].
+/// Formats a number with three significant digits: `0.0196`, `12.3`, `4.30e-5`. See [`rounded`].
 pub fn number(x: f64) -> String {
     rounded(x, 3)
 }
 
-/// A number with this many significant digits, decimal from `0.0001` to a million and with an exponent beyond; digits before the point are
-/// all shown. Numbers that are not finite become `-`.
+/// Formats a number with this many significant digits, as a decimal from `0.0001` to a million and with an exponent otherwise; digits
+/// before the point are never cut. Numbers that are not finite become `-`.
 pub fn rounded(x: f64, digits: usize) -> String {
     let after = digits.max(1) - 1;
     if !x.is_finite() {
@@ -148,17 +148,17 @@ pub fn rounded(x: f64, digits: usize) -> String {
     }
 }
 
-/// A fraction in per cent, three significant digits, without the sign of per cent.
+/// Formats a fraction in per cent with three significant digits, without the sign `%`.
 pub fn percentage(fraction: f64) -> String {
     number(100.0 * fraction)
 }
 
-/// A fraction in per cent, three significant digits: `1.23 %`.
+/// Formats a fraction in per cent with three significant digits: `1.23 %`.
 pub fn percent(fraction: f64) -> String {
     if fraction.is_finite() { format!("{} %", percentage(fraction)) } else { "-".to_string() }
 }
 
-/// [`rounded`] without zeros at the end: `3`, `1.25e-9`.
+/// Formats a number as [`rounded`] does, without trailing zeros: `3`, `1.25e-9`.
 pub fn trimmed(x: f64, digits: usize) -> String {
     let text = rounded(x, digits);
     let (mantissa, exponent) = text.split_at(text.find('e').unwrap_or(text.len()));
@@ -166,7 +166,7 @@ pub fn trimmed(x: f64, digits: usize) -> String {
     format!("{short}{exponent}")
 }
 
-/// [`trimmed`] in LaTeX: `1.25 \times 10^{-9}`.
+/// Formats a number as [`trimmed`] does, in LaTeX: `1.25 \times 10^{-9}`.
 pub fn latex_number(x: f64, digits: usize) -> String {
     let text = trimmed(x, digits);
     match text.split_once('e') {
@@ -175,7 +175,7 @@ pub fn latex_number(x: f64, digits: usize) -> String {
     }
 }
 
-/// A name in LaTeX: Greek letters by their commands, digits at the end as an index.
+/// Formats a name in LaTeX: Greek letters as commands, trailing digits as an index.
 pub fn latex_name(name: &str) -> String {
     const GREEK: [&str; 20] = [
         "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi",
@@ -193,15 +193,16 @@ pub fn latex_name(name: &str) -> String {
     stem + &index
 }
 
-/// Columns of a terminal that texts and tables keep to.
+/// Maximal number of characters in a line of texts and tables.
 pub const WIDTH: usize = 120;
 
-/// Width of a text in characters.
+/// Returns the width of a text in characters.
 pub fn width(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Lines of at most `most` characters, cut at blanks, but not between a number and its `%`; a longer word gets a line of its own.
+/// Wraps a text at spaces to lines of at most `most` characters, but not between a number and its `%`; a longer word gets a line of its
+/// own.
 pub fn cut(text: &str, most: usize) -> Vec<String> {
     let (mut lines, mut words) = (Vec::<String>::new(), Vec::<String>::new());
     for word in text.split(' ').filter(|word| !word.is_empty()) {
@@ -225,7 +226,7 @@ pub fn cut(text: &str, most: usize) -> Vec<String> {
     lines
 }
 
-/// As [`cut`], but words are cut too if nothing else fits.
+/// Wraps a text as [`cut`] does, but splits words that do not fit in a line.
 pub fn cut_hard(text: &str, most: usize) -> Vec<String> {
     let most = most.max(1);
     let pieces = |line: String| -> Vec<String> {
@@ -236,8 +237,8 @@ pub fn cut_hard(text: &str, most: usize) -> Vec<String> {
     cut(text, most).into_iter().flat_map(pieces).collect()
 }
 
-/// A text with every line longer than `most` cut at blanks; continuation lines start below the text of that line: after its indentation
-/// and, if there are two columns, after the first one.
+/// Wraps every line longer than `most` at spaces. Continuation lines are indented to the text of that line: after its indentation and, if
+/// there are two columns, after the first one.
 pub fn wrap_text(text: &str, most: usize) -> String {
     let mut whole = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
@@ -257,7 +258,7 @@ pub fn wrap_text(text: &str, most: usize) -> String {
     whole
 }
 
-/// The column at which the text of a line begins: after its indentation, or after the first of two columns separated by blanks.
+/// Returns the column at which the text of a line begins: after its indentation, or after the first of two columns separated by spaces.
 fn hang(line: &str, most: usize) -> usize {
     let indent = line.chars().take_while(|c| *c == ' ').count();
     let letters: Vec<char> = line.chars().collect();
@@ -337,7 +338,7 @@ mod tests {
         assert_eq!(texts, ["0.0196", "1.00", "-12.3", "0.000457", "123", "13643", "1000"]);
         let texts = [0.0, -0.0, 4.3e-5, -1.2345e-7, 999_999.0, 1_234_567.0, 1e300].map(number);
         assert_eq!(texts, ["0", "0", "4.30e-5", "-1.23e-7", "1.00e6", "1.23e6", "1.00e300"]);
-        // Rounding may add a digit in front of the point.
+        // Rounding may add a digit before the point.
         assert_eq!([9.999, 0.999_9, 0.000_099_99].map(number), ["10.0", "1.00", "0.000100"]);
         assert_eq!([f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(number), ["-"; 3]);
     }

@@ -13,23 +13,23 @@ use alloc::boxed::Box;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-/// A network with its weights: `L(q, v)`, perhaps a dissipation `D(q, v)`, and everything that follows from them.
+/// A network with its weights: `L(q, v)`, an optional dissipation `D(q, v)`, and the terms computed from them.
 ///
-/// The network works in scaled coordinates `q_i/s_i`, `v_i/s_i`; terms are returned in physical units, `L` in the
-/// network's own unit (a factor and a total derivative of `L` move nothing). Periodic coordinates are reduced to
-/// `[0, 2 pi)` before the network sees them.
+/// The network works in scaled coordinates `q_i/s_i`, `v_i/s_i`. Terms are returned in physical units, but `L` in the network's own unit,
+/// since a factor and a total derivative of `L` do not change the motion. Periodic coordinates are reduced to `[0, 2 pi)` before the
+/// network.
 #[derive(Debug)]
 pub struct NetworkLagrangian<S> {
     architecture: Architecture,
     weights: Vec<S>,
     model: Model<S>,
-    /// Workspaces that no call uses at the moment.
+    /// Workspaces that are currently not in use.
     idle: Mutex<Vec<Workspace<S>>>,
     code: Code<S>,
 }
 
-/// The evaluation code of a network, by reference: it is compiled where networks are made, so that a crate that receives one from a
-/// training does not compile it again.
+/// The evaluation code of a network as function pointers: it is compiled where networks are created, so that a crate that receives one from
+/// a training does not compile it again.
 #[derive(Clone, Copy, Debug)]
 struct Code<S> {
     terms: TermsOf<S>,
@@ -50,7 +50,7 @@ struct Workspace<S> {
     linalg: linalg::Workspace<S>,
 }
 
-/// Why weights do not make a network.
+/// The reason why weights do not define a network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NetworkError {
@@ -58,9 +58,9 @@ pub enum NetworkError {
     Architecture(String),
     /// There are too few or too many weights.
     Weights {
-        /// Parameters of the architecture.
+        /// Number of parameters of the architecture.
         expected: usize,
-        /// Numbers given.
+        /// Number of given weights.
         found: usize,
     },
 }
@@ -77,7 +77,7 @@ impl core::fmt::Display for NetworkError {
 impl core::error::Error for NetworkError {}
 
 impl Architecture {
-    /// Checks that the lists fit each other and that nothing is empty or not finite.
+    /// Checks that the lists have matching lengths, nothing is empty and all numbers are finite.
     ///
     /// # Errors
     /// The first mismatch, in words.
@@ -136,30 +136,30 @@ impl Architecture {
 }
 
 impl Architecture {
-    /// `true` if there is any friction.
+    /// Returns `true` if there is any friction.
     pub fn has_friction(&self) -> bool {
         let known = self.form.known.as_ref().is_some_and(|known| known.dissipation.is_some());
         known || self.dissipation.is_some() || !self.form.joint_friction.is_none()
     }
-    /// Outputs of the network.
+    /// Returns the number of outputs of the network.
     pub(crate) fn outputs(&self) -> usize {
         self.form.outputs(self.coordinates, self.time_like.is_some())
     }
-    /// Name and initial values of the parameters besides the network.
+    /// Returns the name and initial values of the parameters outside the network.
     pub(crate) fn own_constants(&self) -> Option<(&'static str, Vec<f64>)> {
         self.form.constants(self.coordinates, self.alpha)
     }
-    /// Initial biases of a structure, those other than 0 with their indices.
+    /// Returns the nonzero initial biases of a structure, with their indices.
     pub(crate) fn initial_biases(&self) -> Vec<(usize, f64)> {
         self.form.initial_biases(self.coordinates, self.time_like.is_some())
     }
 }
 
 impl<S: Scalar> NetworkLagrangian<S> {
-    /// A network of this shape with these flat parameters (see [`Layout`]).
+    /// Creates a network of this shape with these flat parameters (see [`Layout`]).
     ///
     /// # Errors
-    /// [`NetworkError`] if the architecture contradicts itself or the number of weights is not its own.
+    /// [`NetworkError`] if the architecture is inconsistent or the number of weights is wrong.
     pub fn new(architecture: Architecture, weights: Vec<S>) -> Result<Self, NetworkError> {
         architecture.validate()?;
         let expected = Layout::new(&architecture).parameters;
@@ -180,26 +180,26 @@ impl<S: Scalar> NetworkLagrangian<S> {
         Self { architecture, weights, model, idle, code }
     }
 
-    /// Shape of the network.
+    /// Returns the shape of the network.
     pub fn architecture(&self) -> &Architecture {
         &self.architecture
     }
-    /// Flat parameters.
+    /// Returns the flat parameters.
     pub fn weights(&self) -> &[S] {
         &self.weights
     }
-    /// This network in another precision.
+    /// Converts this network to another precision.
     pub fn cast<T: Scalar>(&self) -> NetworkLagrangian<T> {
         let weights = self.weights.iter().map(|&w| w.cast()).collect();
         NetworkLagrangian::of_valid(self.architecture.clone(), weights)
     }
 
-    /// The recorded functions.
+    /// Returns the recorded functions.
     pub(super) fn model(&self) -> &Model<S> {
         &self.model
     }
 
-    /// The pattern of the smallest network of the same form: widths do not change zeros.
+    /// Finds the pattern with the smallest network of the same form, because widths do not affect which elements are zero.
     fn find_pattern(&self) -> Option<Pattern> {
         let Architecture { hidden, activation, coordinates: n, .. } = &self.architecture;
         let width = 2 * activation.branches().len();
@@ -314,7 +314,7 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
         !self.architecture.has_friction()
     }
 
-    /// True from about 200,000 weights on: a single state then waits for them longer than threads take to synchronise.
+    /// Returns `true` from about 200,000 weights on, when loading them for a single state takes longer than the synchronization of threads.
     fn prefers_batches(&self) -> bool {
         self.weights.len() >= 200_000
     }

@@ -1,11 +1,11 @@
-//! The Lagrangian of a network, and its dissipation, over [`Real`]: evaluated directly on floats and forward numbers, recorded as blocks on
-//! the tape; its input features; a known Lagrangian beside the network.
+//! The Lagrangian of a network and its dissipation over [`Real`], evaluated directly with floats and forward-mode numbers, or recorded as
+//! blocks on the tape; its input features; a known Lagrangian that is added to the network.
 //!
-//! Every coordinate gives the network one feature `q_i/s_i`, or two, `sin q_i` and `cos q_i`, when it is an embedded angle; every velocity
-//! gives `v_i/s_i`. Cyclic coordinates give none. Those of a [`Radial`] group come last, two features each.
+//! Every coordinate contributes one input feature `q_i/s_i`, or for an embedded angle two, `sin q_i` and `cos q_i`; every velocity
+//! contributes `v_i/s_i`. Cyclic coordinates contribute none. Those of a [`Radial`] group come last, with two features each.
 //!
-//! A known Lagrangian may have constants to be learned. A learned constant with a positive default `p0` and a nonnegative allowed range is
-//! `p0 e^theta`, any other one `p0 + theta`; `theta` is the parameter, 0 at the start.
+//! A known Lagrangian may have learned constants. A learned constant with a positive default `p0` and a nonnegative allowed range is `p0
+//! e^theta`, any other one `p0 + theta`, where the parameter `theta` is initially 0.
 
 use crate::lagrangian::system::{Parameter, Range, System};
 use crate::lagrangian::{Description, Lagrangian};
@@ -21,7 +21,7 @@ impl Lagrangian for Architecture {
         self.coordinates
     }
 
-    /// `L` of states in physical units; `parameters` are the flat weights. Angles are not wrapped.
+    /// Computes `L` of a state in physical units; `parameters` are the flat weights. Angles are not wrapped.
     fn lagrangian<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let layout = Layout::new(self);
         let (positions, velocities) = (self.position_features_of(q), self.scaled_velocities(v));
@@ -47,11 +47,12 @@ impl Lagrangian for Architecture {
 }
 
 impl Architecture {
-    /// The Rayleigh dissipation `D = sum_k softplus(gamma_k + w_k.f(q)) ln cosh(b_k.(v/s))` of states in physical units, plus the [joint
-    /// friction](super::JointFriction) and the friction of the known part; 0 without friction. Friction is the generalized force `-dD/dv`.
+    /// Computes the Rayleigh dissipation `D = sum_k softplus(gamma_k + w_k.f(q)) ln cosh(b_k.(v/s))` of a state in physical units, plus the
+    /// [joint friction](super::JointFriction) and the friction of the known part; 0 without friction. Friction is the generalized force
+    /// `-dD/dv`.
     ///
-    /// `f(q)` are the input features made of coordinates, `parameters` the flat weights. The unit of `D` is that of `L` per unit of time.
-    /// Angles are not wrapped.
+    /// `f(q)` are the input features computed from coordinates, and `parameters` the flat weights. The unit of `D` is that of `L` per unit
+    /// of time. Angles are not wrapped.
     pub fn rayleigh_dissipation<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
         let layout = Layout::new(self);
         let (positions, velocities) = (self.position_features_of(q), self.scaled_velocities(v));
@@ -71,7 +72,7 @@ impl Architecture {
     }
 }
 
-/// `act(W x + b)`.
+/// Computes `act(W x + b)`.
 fn evaluate<R: Real>(layer: &Layer, parameters: &[R], x: &[R]) -> Vec<R> {
     let (weights, bias) = (&parameters[layer.weight_range()], &parameters[layer.bias_range()]);
     let mut z: Vec<R> = match layer.map {
@@ -86,19 +87,19 @@ fn evaluate<R: Real>(layer: &Layer, parameters: &[R], x: &[R]) -> Vec<R> {
 }
 
 impl Architecture {
-    /// Number of input features from coordinates: two per embedded angle and radial coordinate, one per other coordinate, none for cyclic
-    /// ones.
+    /// Returns the number of input features from coordinates: two per embedded angle and radial coordinate, one per other coordinate, none
+    /// for cyclic ones.
     pub(crate) fn position_features(&self) -> usize {
         let seen = (0..self.coordinates).filter(|i| !self.form.cyclic.contains(i));
         seen.map(|i| if self.embeds(i) || self.form.is_radial(i) { 2 } else { 1 }).sum()
     }
 
-    /// `true` if coordinate `i` enters by its sine and cosine.
+    /// Returns `true` if the inputs contain the sine and cosine of coordinate `i`.
     pub fn embeds(&self, i: usize) -> bool {
         self.embed_periodic && self.periodic[i]
     }
 
-    /// Features made of the coordinates `q`, of length `n` in physical units.
+    /// Computes the input features from the coordinates `q`, of length `n` in physical units.
     fn position_features_of<R: Real>(&self, q: &[R]) -> Vec<R> {
         let mut features = Vec::with_capacity(self.position_features() + self.coordinates);
         let single = |i: usize| !self.form.cyclic.contains(&i) && !self.form.is_radial(i);
@@ -114,14 +115,14 @@ impl Architecture {
         features
     }
 
-    /// `v_i/s_i`.
+    /// Computes `v_i/s_i`.
     fn scaled_velocities<R: Real>(&self, v: &[R]) -> Vec<R> {
         v.iter().zip(&self.scale).map(|(&v, &s)| v / R::of(s)).collect()
     }
 }
 
 impl Radial {
-    /// `(x_i/R) ln(R/u)` and `u x_i/R^2` of every coordinate of the group.
+    /// Adds `(x_i/R) ln(R/u)` and `u x_i/R^2` for every coordinate of the group.
     fn add_features<R: Real>(&self, q: &[R], features: &mut Vec<R>) {
         let unit = R::of(self.unit);
         let square = self.coordinates.iter().fold(R::zero(), |sum, &i| sum + q[i].sqr());
@@ -134,7 +135,7 @@ impl Radial {
     }
 }
 
-/// The system that a known part describes.
+/// Builds the system that a known part describes.
 pub(super) fn system(description: &Description, n: usize) -> Result<System, String> {
     let system = description.system().map_err(|error| error.to_string())?;
     if !description.forces.is_empty() || system.described.as_ref().is_some_and(|described| described.is_timed()) {
@@ -147,7 +148,7 @@ pub(super) fn system(description: &Description, n: usize) -> Result<System, Stri
     }
 }
 
-/// A constant at its parameter.
+/// Returns the value of a constant, given its learned parameter.
 fn value<R: Real>(parameter: &Parameter, theta: Option<R>) -> R {
     let default = R::Scalar::parse(&parameter.default).unwrap_or(R::Scalar::nan());
     let positive = parameter.range != Range::Any && default > R::Scalar::of_f64(0.0);
@@ -159,14 +160,14 @@ fn value<R: Real>(parameter: &Parameter, theta: Option<R>) -> R {
 }
 
 impl Architecture {
-    /// Values of all constants of the known part, in the order of their names, with the flat parameters of the model; empty
-    /// without a known part, or with one that describes no system.
+    /// Returns the values of all constants of the known part, sorted by name, given the flat parameters of the model; empty without a known
+    /// part, or if its description is invalid.
     fn known_parameters<R: Real>(&self, parameters: &[R]) -> Vec<R> {
         let described = self.form.known.as_ref().and_then(|known| system(known, self.coordinates).ok());
         described.map_or_else(Vec::new, |system| self.constants(&system, parameters))
     }
 
-    /// These values by name, in double precision.
+    /// Returns these values by name, in double precision.
     pub fn known_constants<S: Scalar>(&self, parameters: &[S]) -> BTreeMap<String, f64> {
         let names = self.form.known.iter().flat_map(|known| known.parameters.keys().cloned());
         names.zip(self.known_parameters(parameters).into_iter().map(Scalar::to_f64)).collect()
@@ -180,7 +181,7 @@ impl Architecture {
         system.parameters.iter().map(own).collect()
     }
 
-    /// The known part of `L`, or with `friction` that of the dissipation function; `None` if there is none.
+    /// Computes the known part of `L`, or with `friction` that of the dissipation function; `None` if there is none.
     fn known_part<R: Real>(&self, parameters: &[R], q: &[R], v: &[R], friction: bool) -> Option<R> {
         let known = self.form.known.as_ref()?;
         let described = system(known, self.coordinates).ok();

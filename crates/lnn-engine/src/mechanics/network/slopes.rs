@@ -1,4 +1,4 @@
-//! Derivatives of the equations of motion of a network, by the sweeps of its training.
+//! Derivatives of the equations of motion of a network, computed with the same sweeps as in training.
 
 use super::{Dynamics, NetworkLagrangian};
 use crate::lagrangian::{Held, MechanicsError, Products, Slopes};
@@ -32,8 +32,8 @@ impl<'a, S: Scalar> NetworkSlopes<'a, S> {
         }
     }
 
-    /// Derivatives of `x.f` at the states collected in `q`, `v`, with the weights `x` and accelerations collected in the directions, in
-    /// physical units. Those by the weights of the network are added to `by_weights`.
+    /// Computes derivatives of `x.f` in physical units at the states collected in `q`, `v`, with the weights `x` and accelerations
+    /// collected in the directions. Derivatives by the weights of the network are added to `by_weights`.
     fn sweep(&mut self) {
         let Self { network, dynamics, directions, q, v, by_q, by_v, by_weights } = self;
         let (scale, n, zero) = (network.model().scale(), network.model().coordinates(), <S as Real>::zero());
@@ -58,7 +58,7 @@ impl<'a, S: Scalar> NetworkSlopes<'a, S> {
         self.directions.clear(true);
     }
 
-    /// Adds a state with its accelerations and weights of its equations.
+    /// Adds a state with its accelerations and the weights of its equations.
     fn push(&mut self, held: &Held<'_, S>, row: usize, weights: impl Iterator<Item = S>) {
         let n = self.network.model().coordinates();
         let at = row * n..(row + 1) * n;
@@ -123,7 +123,8 @@ mod tests {
     use crate::random::RngStream;
     use crate::scalar::Dd;
 
-    /// Compares the derivatives of a network with an angle, scales and friction with differences of its accelerations in double-double.
+    /// Compares the derivatives of a network with an angle, scales and friction with differences of its accelerations in double-double
+    /// precision.
     #[test]
     fn a_network_is_linearized_exactly() {
         let architecture = Architecture {

@@ -19,10 +19,10 @@ use alloc::vec::Vec;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Builds the choice from rows `Name "name in configurations and files";`.
+/// Defines the choices from rows `Name "name in configurations and files";`.
 macro_rules! structures {
     ($first:ident $first_text:literal $first_doc:literal; $($name:ident $text:literal $doc:literal;)*) => {
-        /// Structure of a Lagrangian: how it is made of the network's outputs.
+        /// Structure of a Lagrangian: how it is computed from the network's outputs.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
         #[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
         #[non_exhaustive]
@@ -35,12 +35,12 @@ macro_rules! structures {
         }
 
         impl Structure {
-            /// Every structure.
+            /// All structures.
             pub const ALL: [Self; 1 + [$($text),*].len()] = [Self::$first, $(Self::$name),*];
             /// The names of all structures, separated by commas.
             pub const NAMES: &'static str = concat!($first_text $(, ", ", $text)*);
 
-            /// The name in configuration files.
+            /// Returns the name in configuration files.
             pub fn name(self) -> &'static str {
                 match self {
                     Self::$first => $first_text,
@@ -59,7 +59,7 @@ structures! {
 }
 
 impl Structure {
-    /// `true` if the network sees the velocities; its output has no bias then, for a constant in `L` moves nothing.
+    /// Returns `true` if velocities are inputs of the network; its output then has no bias, because a constant in `L` has no effect.
     pub(super) fn sees_velocities(self) -> bool {
         match self {
             Self::BlackBox => true,
@@ -67,7 +67,7 @@ impl Structure {
         }
     }
 
-    /// `true` if one of the coordinates can be a time.
+    /// Returns `true` if one of the coordinates can be time-like.
     fn takes_a_time(self) -> bool {
         match self {
             Self::BlackBox | Self::Metric => true,
@@ -75,7 +75,7 @@ impl Structure {
         }
     }
 
-    /// `true` if the mass matrix has its signature by construction: one negative direction for a time, all others positive.
+    /// Returns `true` if the signature of the mass matrix is fixed by construction: one negative direction for a time, all others positive.
     pub fn has_signature(self) -> bool {
         match self {
             Self::BlackBox => false,
@@ -84,40 +84,40 @@ impl Structure {
     }
 }
 
-/// Initial factor of a constant mass matrix beside a known Lagrangian.
+/// Initial factor of a constant mass matrix that is added to a known Lagrangian.
 const BESIDE_KNOWN: f64 = 0.01;
 
-/// Knowledge of a Lagrangian beforehand.
+/// Prior knowledge of a Lagrangian.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields, default))]
 pub struct Form {
-    /// Structure of a Lagrangian: how it is made of the network's outputs.
+    /// Structure of the Lagrangian.
     pub structure: Structure,
-    /// Factor of the kinetic energy or the metric; files without this key have a triangle.
+    /// Factor of the kinetic energy or the metric; a triangle in files without this key.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Factor::is_triangle"))]
     pub factor: Factor,
-    /// Coordinates that `L` does not depend on: their momenta are conserved exactly.
+    /// Coordinates on which `L` does not depend, so that their momenta are conserved exactly.
     pub cyclic: Vec<usize>,
-    /// `true` if `L(q, -v) = L(q, v)`: the motion can be run backwards.
+    /// `true` if `L(q, -v) = L(q, v)`, so that the motion is reversible.
     pub even_in_v: bool,
     /// `true` if `alpha` of a black box is learned.
     pub learn_alpha: bool,
-    /// Groups of coordinates that enter by direction and distance; files without this key have none.
+    /// Groups of coordinates that enter by direction and distance; empty in files without this key.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub radial: Vec<Radial>,
-    /// A known Lagrangian, in physical units, that is added; its constants marked `learn` are learned.
+    /// A known Lagrangian, in physical units, that is added; its constants with `learn` are learned.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub known: Option<Box<Description>>,
-    /// Friction of every coordinate individually; files without this key have none.
+    /// Friction of every coordinate individually; none in files without this key.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "JointFriction::is_none"))]
     pub joint_friction: JointFriction,
-    /// Sizes of the parts; files without this key have all of size 1.
+    /// Sizes of the parts; all are 1 in files without this key.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub sizes: Option<Sizes>,
 }
 
-/// Typical sizes of the parts of a model, in scaled coordinates, so that a network learns numbers near 1: in an arm, gravity far exceeds
-/// inertia, and the inertia of the first joint far exceeds that of the last one.
+/// Typical sizes of the parts of a model in scaled coordinates, so that the network's outputs are near 1. In an arm, for example, gravity
+/// far exceeds inertia, and the inertia of the first joint far exceeds that of the last one.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Sizes {
@@ -130,7 +130,7 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// `true` for `n` positive numbers of each kind.
+    /// Returns `true` for `n` positive numbers of each kind.
     fn are_valid(&self, n: usize) -> bool {
         let all = || self.velocity.iter().chain(&self.friction).chain([&self.potential]);
         let lengths = [self.velocity.len(), self.friction.len()];
@@ -139,28 +139,28 @@ impl Sizes {
 }
 
 /// Cartesian coordinates `x` around a centre, resolved equally well near and far: each enters as `(x_i/R) ln(R/u)` and as `(x_i/R) (u/R)`,
-/// `R` the distance from the centre. At the centre itself there is no feature.
+/// where `R` is the distance from the centre. The features are not defined at the centre itself.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Radial {
     /// The coordinates.
     pub coordinates: Vec<usize>,
-    /// Distance `u`, in the unit of the coordinates: that of the nearest states works well.
+    /// Distance `u`, in the unit of the coordinates; the smallest distance in the data works well.
     pub unit: f64,
 }
 
 impl Form {
-    /// `true` if coordinate `i` belongs to a radial group.
+    /// Returns `true` if coordinate `i` belongs to a radial group.
     pub(crate) fn is_radial(&self, i: usize) -> bool {
         self.radial.iter().any(|group| group.coordinates.contains(&i))
     }
 
-    /// `true` if nothing is known.
+    /// Returns `true` if there is no prior knowledge.
     pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Checks that the other settings fit the structure, for `n` coordinates.
+    /// Checks that the other settings are compatible with the structure, for `n` coordinates.
     pub(super) fn check(&self, n: usize, time_like: Option<usize>) -> Result<(), String> {
         let (structure, name) = (self.structure, self.structure.name());
         if time_like.is_some() && !structure.takes_a_time() {
@@ -181,7 +181,7 @@ impl Form {
         Ok(())
     }
 
-    /// Outputs of the network for `n` coordinates, one of them a time if `lorentzian`.
+    /// Returns the number of outputs of the network for `n` coordinates, one of which is a time if `lorentzian`.
     pub(crate) fn outputs(&self, n: usize, lorentzian: bool) -> usize {
         let potentials = 1 + if self.even_in_v { 0 } else { n };
         match self.structure {
@@ -192,7 +192,7 @@ impl Form {
         }
     }
 
-    /// Initial biases of the outputs, those other than 0 with their indices.
+    /// Returns the nonzero initial biases of the outputs, with their indices.
     pub(super) fn initial_biases(&self, n: usize, lorentzian: bool) -> Vec<(usize, f64)> {
         match self.structure {
             Structure::BlackBox | Structure::ConstantMass => Vec::new(),
@@ -201,7 +201,7 @@ impl Form {
         }
     }
 
-    /// Name and initial values of the parameters outside the network; `alpha` is the factor of the added term.
+    /// Returns the name and initial values of the parameters outside the network; `alpha` is the coefficient of the added term.
     pub(super) fn constants(&self, n: usize, alpha: f64) -> Option<(&'static str, Vec<f64>)> {
         match self.structure {
             Structure::BlackBox => self.learn_alpha.then(|| ("alpha", vec![alpha])),
@@ -216,7 +216,7 @@ impl Form {
         }
     }
 
-    /// `L` of a state, from a network that maps input features to outputs.
+    /// Computes `L` of a state, from a network that maps input features to outputs.
     pub(super) fn lagrangian<R: Real>(&self, network: impl Fn(&[R]) -> Vec<R>, state: LagrangianInputs<'_, R>) -> R {
         let LagrangianInputs { positions, velocities, constants, alpha, time_like } = state;
         let (n, factor) = (velocities.len(), self.factor);
@@ -260,49 +260,50 @@ impl Form {
     }
 }
 
-/// Parts of a Lagrangian besides the network.
+/// Inputs of a Lagrangian in addition to the network.
 pub(super) struct LagrangianInputs<'a, R> {
-    /// Input features made of the coordinates.
+    /// Input features computed from the coordinates.
     pub positions: &'a [R],
     /// Scaled velocities `v_i/s_i`.
     pub velocities: &'a [R],
     /// The parameters outside the network.
     pub constants: &'a [R],
-    /// Factor of the term added to a black box, if it is not learned.
+    /// Coefficient of the term added to a black box, if it is not learned.
     pub alpha: f64,
-    /// The coordinate that is a time.
+    /// Index of the time-like coordinate.
     pub time_like: Option<usize>,
 }
 
-/// Factor of the quadratic form of a structure, which makes it a sum of squares.
+/// Factor of the quadratic form of a structure, which makes the form a sum of squares.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 #[non_exhaustive]
 pub enum Factor {
-    /// A lower triangle with the diagonal `softplus(c_ii) + 10^-3`: as many squares as coordinates.
+    /// A lower triangle with the diagonal `softplus(c_ii) + 10^-3`, which gives as many squares as coordinates.
     #[default]
     Triangle,
-    /// A rectangle of numbers of any sign plus `10^-6` times the identity: three squares for every spatial coordinate, the lengths of the
-    /// velocity in a space around it, smooth where the diagonal of a triangle has a root. A time has its own shift and lapse.
+    /// A rectangle of arbitrary numbers plus `10^-6` times the identity: three squares for every spatial coordinate, that is, the squared
+    /// velocity in a space of higher dimension. It stays smooth where the diagonal of a triangle has a root. A time has a separate shift
+    /// and lapse.
     Rectangle,
 }
 
-/// Smallest diagonal element of a triangular factor, and of a lapse; its square is the smallest eigenvalue added to a rectangle.
+/// Smallest diagonal element of a triangular factor, and smallest lapse; its square is added to the eigenvalues of a rectangle.
 const LEAST: f64 = 1e-3;
 
-/// Rows of a rectangle for every coordinate in space: the speeds in a space with room around.
+/// Number of rows of a rectangle for every spatial coordinate.
 const ROWS: usize = 3;
 
 /// Initial biases of the diagonal of a triangle: `softplus(1) = 1.31`.
 const DIAGONAL: f64 = 1.0;
 
 impl Factor {
-    /// `true` for the default of files without the key.
+    /// Returns `true` for the default in files without the key.
     fn is_triangle(&self) -> bool {
         *self == Self::Triangle
     }
 
-    /// Numbers of a form in `n` coordinates, one of them a time if it is `lorentzian`.
+    /// Returns how many numbers define a form in `n` coordinates, one of which is a time if `lorentzian`.
     pub(super) fn numbers(self, n: usize, lorentzian: bool) -> usize {
         let space = n - usize::from(lorentzian);
         match self {
@@ -311,7 +312,7 @@ impl Factor {
         }
     }
 
-    /// Initial biases of the numbers, those other than 0 with their indices: a form of 1.7 times the identity.
+    /// Returns the nonzero initial biases of the numbers, with their indices: they give 1.7 times the identity.
     pub(super) fn initial_biases(self, n: usize, lorentzian: bool) -> Vec<(usize, f64)> {
         let space = n - usize::from(lorentzian);
         match self {
@@ -323,7 +324,7 @@ impl Factor {
         }
     }
 
-    /// Factor of the initial output weights.
+    /// Returns the factor of the initial output weights.
     pub(super) fn variation(self) -> f64 {
         match self {
             Self::Triangle => 0.1,
@@ -331,8 +332,8 @@ impl Factor {
         }
     }
 
-    /// Half the form of `v`; `order` is the order of the coordinates, the last one a time, counted negative, if it is
-    /// `lorentzian`.
+    /// Computes half of the quadratic form of `v`. `order` is the order of the coordinates; the last one is a time with a negative square,
+    /// if `lorentzian`.
     ///
     /// - Triangle: `v.C eta C^T v / 2`, the numbers those of `C`, row by row.
     /// - Rectangle: `|B w|^2 / 2 - (N v_t)^2 / 2`, `w_i = v_i + shift_i v_t`, the numbers those of `B`, row by row, then the
@@ -345,7 +346,7 @@ impl Factor {
     }
 }
 
-/// A positive number from any.
+/// Maps any number to a positive one.
 fn positive<R: Real>(x: R) -> R {
     x.softplus() + R::of(LEAST)
 }
@@ -382,7 +383,7 @@ fn half_form_of_rectangle<R: Real>(numbers: &[R], v: &[R], order: &[usize], lore
     form * R::half()
 }
 
-/// The coordinates with the time-like one last.
+/// Returns the coordinates with the time-like one last.
 fn time_last(n: usize, time: Option<usize>) -> Vec<usize> {
     (0..n).filter(|&i| Some(i) != time).chain(time).collect()
 }
@@ -399,7 +400,7 @@ mod tests {
         }
     }
 
-    /// `softplus(x) + 10^-3 = 1`: a unit triangle gives the Minkowski metric, whatever the position of the time.
+    /// With `softplus(x) + 10^-3 = 1`, a unit triangle gives the Minkowski metric, whatever the index of the time.
     #[test]
     fn a_unit_triangle_gives_the_minkowski_metric() {
         let one = (0.999_f64).exp_m1().ln();
@@ -415,7 +416,7 @@ mod tests {
         assert_eq!(time_last(2, None), [0, 1]);
     }
 
-    /// `|B w|^2 - (N v_t)^2` with the shift in `w`, and `10^-6 |w|^2`, for numbers worked out by hand.
+    /// Checks `|B w|^2 - (N v_t)^2`, with the shift in `w`, and `10^-6 |w|^2`, for numbers computed by hand.
     #[test]
     fn a_rectangle_is_a_sum_of_squares_with_shift_and_lapse() {
         let lapse = (2.0 - LEAST).exp_m1().ln();
@@ -428,7 +429,7 @@ mod tests {
         assert_eq!(lorentzian.len(), Factor::Rectangle.numbers(3, true));
         let found: f64 = Factor::Rectangle.half_form(&lorentzian, &v, &order, true);
         assert!((found - (squares - 16.0) / 2.0).abs() < 1e-13);
-        // A time alone.
+        // A single time-like coordinate.
         assert_eq!(
             Factor::Rectangle.half_form(&[lapse], &[1.0], &[0], true),
             -0.5 * (lapse.exp().ln_1p() + LEAST).powi(2)

@@ -1,4 +1,4 @@
-//! Files written whole or not at all, by a few operations, so that each can be made to fail.
+//! Files that are written completely or not at all, through a few operations that tests can make fail.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{File, OpenOptions};
@@ -9,30 +9,30 @@ use std::{fs, io};
 
 /// Operations of a file system. [`Disk`] is the real one; tests use a failing one instead.
 pub trait Files: Send + Sync {
-    /// Creates a file for writing; one that exists is refused.
+    /// Creates a file for writing; fails if it exists.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the system.
     fn create(&self, path: &Path) -> io::Result<File>;
-    /// Writes some of the bytes and returns how many.
+    /// Writes some of the bytes and returns their number.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the system.
     fn write(&self, file: &mut File, bytes: &[u8]) -> io::Result<usize>;
-    /// Returns when the file's content is on the disk.
+    /// Waits until the content of the file is on the disk.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the system.
     fn sync(&self, file: &File) -> io::Result<()>;
     /// Renames a file, replacing any file of that name.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the system.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
-    /// Returns when the names in a directory are on the disk.
+    /// Waits until the names in a directory are on the disk.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the system.
     fn sync_directory(&self, directory: &Path) -> io::Result<()>;
     /// Reads a regular file of at most `limit` bytes.
     ///
@@ -42,11 +42,11 @@ pub trait Files: Send + Sync {
     /// Removes a file.
     ///
     /// # Errors
-    /// The system's.
+    /// The error of the system.
     fn remove(&self, path: &Path) -> io::Result<()>;
 }
 
-/// The file system of the machine.
+/// The real file system.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Disk;
 
@@ -65,7 +65,7 @@ impl Files for Disk {
     }
     fn sync_directory(&self, directory: &Path) -> io::Result<()> {
         match File::open(directory).and_then(|directory| directory.sync_all()) {
-            // Some systems cannot open or synchronise a directory; there the rename alone has to do.
+            // Some systems cannot open or synchronise a directory; there the rename must suffice.
             Err(error)
                 if matches!(
                     error.kind(),
@@ -85,7 +85,7 @@ impl Files for Disk {
     }
 }
 
-/// Repetitions of an operation that a signal interrupts, before it counts as failed.
+/// Number of retries after a signal interrupts an operation, before it counts as failed.
 const INTERRUPTIONS: usize = 64;
 
 /// Repeats an operation that a signal interrupted.
@@ -99,7 +99,7 @@ fn uninterrupted<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<
     operation()
 }
 
-/// Writes all of the bytes, however few the system takes at a time.
+/// Writes all bytes, in several calls if necessary.
 pub(super) fn write_all(files: &dyn Files, file: &mut File, mut bytes: &[u8]) -> io::Result<()> {
     while !bytes.is_empty() {
         match uninterrupted(|| files.write(file, bytes))? {
@@ -110,22 +110,22 @@ pub(super) fn write_all(files: &dyn Files, file: &mut File, mut bytes: &[u8]) ->
     Ok(())
 }
 
-/// Why a file could not be read.
+/// The reason why a file could not be read.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum ReadError {
-    /// Nothing there.
+    /// The file does not exist.
     Missing,
-    /// A directory, a pipe, a device.
+    /// The path is a directory, a pipe or a device.
     NotRegular(&'static str),
-    /// More bytes than the reader takes.
+    /// The file exceeds the size limit.
     TooLarge {
         /// Size of the file.
         bytes: u64,
         /// Largest size.
         limit: u64,
     },
-    /// The system refused.
+    /// The system reported an error.
     Io(io::Error),
 }
 
@@ -155,10 +155,10 @@ impl From<io::Error> for ReadError {
     }
 }
 
-/// Opens a regular file of at most `limit` bytes; its size comes second.
+/// Opens a regular file of at most `limit` bytes; also returns its size.
 ///
-/// Links are followed. Kind and size are checked before anything is opened, so that a pipe cannot block and a device
-/// cannot fill the memory.
+/// Links are followed. Kind and size are checked before the file is opened, so that a pipe cannot block and a device cannot fill the
+/// memory.
 ///
 /// # Errors
 /// [`ReadError`].
@@ -180,8 +180,7 @@ pub fn open_regular(path: &Path, limit: u64) -> Result<(File, u64), ReadError> {
     Ok((File::open(path)?, data.len()))
 }
 
-/// Reads a regular file of at most `limit` bytes, opened like [`open_regular`]; one that grows beyond while it is read
-/// is refused.
+/// Reads a regular file of at most `limit` bytes, opened with [`open_regular`]; fails if the file grows beyond the limit while it is read.
 ///
 /// # Errors
 /// [`ReadError`].
@@ -192,20 +191,20 @@ pub fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
     if read > limit { Err(ReadError::TooLarge { bytes: read, limit }) } else { Ok(bytes) }
 }
 
-/// Writes `bytes` to `path` so that a reader sees the old content or the new, never part of either.
+/// Writes `bytes` to `path` so that a reader sees either the old or the new content, never a part of it.
 ///
-/// The bytes go to a temporary file in the same directory, reach the disk, and take the name by a rename, which reaches the disk with the
-/// directory. A link is followed; a target that is not a regular file (`/dev/stdout`, a pipe) is written in place. On failure the temporary
-/// file is removed and the old content stays. Only if the last operation fails, that of the directory, is the new content in place, and a
-/// power failure could still undo it.
+/// The bytes are written to a temporary file in the same directory, synchronised to the disk, and given the final name by a rename, which
+/// is synchronised with the directory. A link is followed; a target that is not a regular file (`/dev/stdout`, a pipe) is written in place.
+/// On failure the temporary file is removed and the old content remains. Only if the synchronisation of the directory fails is the new
+/// content in place, and a power failure could still undo the rename.
 ///
 /// # Errors
-/// The error of the file system; a directory as target is refused.
+/// The error of the file system; a directory as target is rejected.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_whole(&Disk, path, bytes)
 }
 
-/// As [`write_atomically`], but a file with content is never replaced, not even one that another writer creates meanwhile.
+/// Does the same as [`write_atomically`], but never replaces a file with content, not even one that another writer creates meanwhile.
 ///
 /// # Errors
 /// [`io::ErrorKind::AlreadyExists`] for a file with content; otherwise those of [`write_atomically`].
@@ -218,12 +217,12 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     match fs::hard_link(&temporary.path, path) {
         Ok(()) => uninterrupted(|| Disk.sync_directory(&temporary.directory)),
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(error),
-        // A file system without such links.
+        // The file system does not support hard links.
         Err(_) => temporary.take_name(),
     }
 }
 
-/// [`write_atomically`] through the operations of `files`.
+/// Does the same as [`write_atomically`] with the file operations `files`.
 ///
 /// # Errors
 /// Those of [`write_atomically`].
@@ -233,26 +232,26 @@ pub fn write_whole(files: &dyn Files, path: &Path, bytes: &[u8]) -> io::Result<(
     file.finish()
 }
 
-/// A file written piece by piece; readers see the old content until [`AtomicWriter::finish`], as with [`write_atomically`].
+/// Writes a file piece by piece; readers see the old content until [`AtomicWriter::finish`], as with [`write_atomically`].
 ///
-/// Dropped before that, it leaves nothing behind, except for data already written in place to a pipe or device.
+/// If it is dropped earlier, it leaves nothing behind, except for data already written in place to a pipe or device.
 pub struct AtomicWriter<'a> {
     files: &'a dyn Files,
     file: File,
-    /// The temporary file; none if the target is written in place.
+    /// The temporary file; `None` if the target is written in place.
     temporary: Option<TemporaryFile<'a>>,
-    /// Bytes gathered for the next write.
+    /// Buffer for the next write.
     buffer: Vec<u8>,
 }
 
-/// Bytes of one write.
+/// Size of the buffer in bytes.
 const BUFFER: usize = 1 << 16;
 
 impl<'a> AtomicWriter<'a> {
-    /// Begins a file that will be `path`.
+    /// Starts writing the file `path`.
     ///
     /// # Errors
-    /// The error of the file system; a directory as target is refused.
+    /// The error of the file system; a directory as target is rejected.
     pub fn create(files: &'a dyn Files, path: &Path) -> io::Result<Self> {
         let target = match fs::canonicalize(path) {
             Ok(existing) => existing,
@@ -270,10 +269,10 @@ impl<'a> AtomicWriter<'a> {
         Ok(Self { files, file, temporary, buffer: Vec::new() })
     }
 
-    /// Adds bytes at the end.
+    /// Appends bytes.
     ///
     /// # Errors
-    /// The error of the file system, the disk being full for one; nothing can be added after it.
+    /// The error of the file system, for example if the disk is full; nothing can be appended after it.
     pub fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
         if self.buffer.is_empty() && bytes.len() >= BUFFER {
             return write_all(self.files, &mut self.file, bytes);
@@ -285,7 +284,7 @@ impl<'a> AtomicWriter<'a> {
         self.flush()
     }
 
-    /// Gives the file its name.
+    /// Completes the file and gives it its name.
     ///
     /// # Errors
     /// Those of [`write_atomically`].
@@ -307,7 +306,7 @@ impl<'a> AtomicWriter<'a> {
     }
 }
 
-/// Tests whether [`write_atomically`] could write to `path`, before the work on the content begins.
+/// Checks whether [`write_atomically`] could write to `path`, before the content is computed.
 ///
 /// A temporary file is created next to the target and removed again.
 ///
@@ -322,11 +321,11 @@ pub fn check_target(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes `bytes` to `newest` and keeps its old content as `previous`, until the next call.
+/// Writes `bytes` to `newest` and keeps its old content in `previous` until the next call.
 ///
-/// The new content is read back before anything is removed. If anything fails, or the program dies at any time, `newest` or `previous`
-/// contains the complete old or new content. If the content of `newest` is known to be damaged, it must not replace `previous`: then `keep`
-/// is false.
+/// The new content is read back before anything is removed. If anything fails, or the program is killed at any time, `newest` or `previous`
+/// contains the complete old or new content. Set `keep` to false if the content of `newest` is known to be damaged, so that it does not
+/// replace `previous`.
 ///
 /// # Errors
 /// The error of the file system, or `InvalidData` if the bytes read back differ.
@@ -339,7 +338,7 @@ pub fn replace(files: &dyn Files, newest: &Path, previous: &Path, bytes: &[u8], 
     temporary.take_name()
 }
 
-/// A temporary file next to its target; removed unless it takes the target's name.
+/// A temporary file in the directory of its target; it is removed unless it is renamed to the target.
 struct TemporaryFile<'a> {
     files: &'a dyn Files,
     target: PathBuf,
@@ -349,7 +348,7 @@ struct TemporaryFile<'a> {
 }
 
 impl<'a> TemporaryFile<'a> {
-    /// Creates the temporary file, empty.
+    /// Creates an empty temporary file.
     fn create(files: &'a dyn Files, target: &Path) -> io::Result<(Self, File)> {
         let name = target.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "names no file"))?;
         let directory = match target.parent() {
@@ -361,7 +360,7 @@ impl<'a> TemporaryFile<'a> {
         Ok((Self { files, target: target.to_path_buf(), directory, path, named: false }, file))
     }
 
-    /// Creates the temporary file with these bytes, on the disk.
+    /// Creates the temporary file with these bytes and synchronises it to the disk.
     fn write(files: &'a dyn Files, target: &Path, bytes: &[u8]) -> io::Result<Self> {
         let (temporary, mut file) = Self::create(files, target)?;
         write_all(files, &mut file, bytes)?;
@@ -369,7 +368,7 @@ impl<'a> TemporaryFile<'a> {
         Ok(temporary)
     }
 
-    /// Gives the file the permissions of the target, if that exists, and flushes it to the disk.
+    /// Gives the file the permissions of an existing target, and synchronises it to the disk.
     fn complete(&self, file: &File) -> io::Result<()> {
         if let Ok(old) = fs::metadata(&self.target) {
             file.set_permissions(old.permissions())?;
@@ -377,7 +376,7 @@ impl<'a> TemporaryFile<'a> {
         uninterrupted(|| self.files.sync(file))
     }
 
-    /// Reads the file back.
+    /// Reads the file back and compares it.
     fn verify(&self, bytes: &[u8]) -> io::Result<()> {
         let read = uninterrupted(|| {
             self.files.read(&self.path, bytes.len() as u64).map_err(|error| match error {
@@ -402,22 +401,22 @@ impl<'a> TemporaryFile<'a> {
 impl Drop for TemporaryFile<'_> {
     fn drop(&mut self) {
         if !self.named {
-            // The first error is the one to report; nothing more can be done if the removal fails too.
+            // The first error is reported; a failed removal is ignored.
             let _ = uninterrupted(|| self.files.remove(&self.path));
         }
     }
 }
 
-/// End of the name of a temporary file.
+/// Suffix of the name of a temporary file.
 const TEMPORARY: &str = ".tmp";
 
-/// A number that is unique in this process.
+/// Returns a number that is unique in this process.
 pub(in crate::support::storage) fn serial() -> usize {
     static COUNTER: AtomicUsize = AtomicUsize::new(0);
     COUNTER.fetch_add(1, Ordering::Relaxed)
 }
 
-/// `.NAME.PROCESS.NUMBER.tmp`.
+/// Returns `.NAME.PROCESS.NUMBER.tmp`.
 fn temporary_name(name: &OsStr) -> OsString {
     let number = serial();
     let mut temporary = OsString::from(".");
@@ -426,9 +425,9 @@ fn temporary_name(name: &OsStr) -> OsString {
     temporary
 }
 
-/// Removes temporary files of killed writers from a directory.
+/// Removes the temporary files of killed writers from a directory.
 ///
-/// Files of running processes stay; if the system does not list running processes (in `/proc`), all stay.
+/// Files of running processes are kept; if the system does not list running processes (in `/proc`), all are kept.
 pub fn remove_leftovers(files: &dyn Files, directory: &Path) {
     let processes = Path::new("/proc");
     if !processes.join("self").exists() {
@@ -444,7 +443,7 @@ pub fn remove_leftovers(files: &dyn Files, directory: &Path) {
     }
 }
 
-/// The process named by a temporary file.
+/// Returns the number of the process that wrote a temporary file, from its name.
 fn writer(name: &str) -> Option<u32> {
     let mut parts = name.strip_prefix('.')?.strip_suffix(TEMPORARY)?.rsplit('.');
     parts.next()?.parse::<usize>().ok()?;

@@ -1,20 +1,20 @@
-//! Locks of directories: one process at a time works in a directory, and the system frees the lock with the process.
+//! Locks of directories: only one process at a time works in a directory, and the system releases the lock when the process ends.
 
 use std::fmt;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Name of the locked file; its text names the process.
+/// Name of the lock file, whose text names the process.
 const LOCK: &str = ".lnn.lock";
 
 /// Longest text of a lock file that is read, in bytes.
 const MAX_BYTES: u64 = 1024;
 
-/// Attempts to lock a file that other processes remove meanwhile.
+/// Number of attempts to lock a file that other processes remove meanwhile.
 const ATTEMPTS: usize = 100;
 
-/// The file, open and locked; none if another process holds the lock.
+/// Opens and locks the file; returns `None` if another process has the lock.
 #[cfg(not(windows))]
 fn lock(path: &Path) -> io::Result<Option<File>> {
     let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
@@ -25,18 +25,18 @@ fn lock(path: &Path) -> io::Result<Option<File>> {
     }
 }
 
-/// `true` if another process holds the lock.
+/// Returns `true` if another process has the lock.
 #[cfg(not(windows))]
 fn is_held(path: &Path) -> bool {
     File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(fs::TryLockError::WouldBlock)))
 }
 
-/// Error of Windows: another process has the file open and does not share it so.
+/// Error of Windows if another process has opened the file without sharing it in this mode.
 #[cfg(windows)]
 const SHARING_VIOLATION: i32 = 32;
 
-/// As on other systems, but opening the file is the lock: others may read it, but neither write nor remove it. A Windows lock would hide
-/// its text from processes that look for the holder.
+/// Does the same on Windows, where opening the file is the lock: others may read it, but neither write nor remove it. A Windows file lock
+/// would hide the text from processes that want to know the holder.
 #[cfg(windows)]
 fn lock(path: &Path) -> io::Result<Option<File>> {
     use std::os::windows::fs::OpenOptionsExt;
@@ -65,17 +65,17 @@ pub struct DirectoryLock {
 /// Outcome of [`DirectoryLock::acquire`].
 #[derive(Debug)]
 pub enum Acquired {
-    /// The lock; if a process died with it, that process.
+    /// The lock was acquired; if a process ended without releasing it, that process is named.
     Lock(DirectoryLock, Option<LockOwner>),
-    /// Another process holds the lock; which one, if its file says so.
+    /// Another process has the lock; it is named if its file contains the name.
     Held(Option<LockOwner>),
 }
 
 impl DirectoryLock {
-    /// Takes the lock of an existing directory, if no other process holds it.
+    /// Acquires the lock of an existing directory, if no other process has it.
     ///
     /// # Errors
-    /// The file system's; [`ErrorKind::ResourceBusy`] if other processes took and left the lock in every attempt.
+    /// The error of the file system; [`ErrorKind::ResourceBusy`] if in every attempt other processes acquired and released the lock.
     pub fn acquire(directory: &Path) -> io::Result<Acquired> {
         let path = directory.join(LOCK);
         for _ in 0..ATTEMPTS {
@@ -86,7 +86,7 @@ impl DirectoryLock {
             io::Seek::rewind(&mut file)?;
             file.write_all(own.as_bytes())?;
             file.flush()?;
-            // A holder that removed the file between opening and locking left a lock on an unnamed file.
+            // If the holder removed the file between opening and locking, this lock is on a file without a name.
             match File::open(&path).map(|mut named| text(&mut named)) {
                 Ok(named) if named == own => {
                     return Ok(Acquired::Lock(Self { path, file: Some(file) }, before));
@@ -99,7 +99,7 @@ impl DirectoryLock {
         Err(ErrorKind::ResourceBusy.into())
     }
 
-    /// The process that holds the lock of a directory, if one does; the inner value is `None` if its file does not name it.
+    /// Returns the process that has the lock of a directory, if there is one; the inner value is `None` if the lock file does not name it.
     pub fn holder(directory: &Path) -> Option<Option<LockOwner>> {
         let path = directory.join(LOCK);
         let owner = LockOwner::of(&path);
@@ -113,12 +113,12 @@ impl Drop for DirectoryLock {
         if cfg!(windows) {
             drop(self.file.take());
         }
-        // A file left behind does no harm: only the lock counts.
+        // A remaining file is harmless, because only the lock counts.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// The beginning of a file, if it is text.
+/// Reads the beginning of a file, if it is text.
 fn text(file: &mut File) -> String {
     let mut text = String::new();
     // An unreadable file does not identify the holder; only the lock itself counts.
@@ -129,14 +129,14 @@ fn text(file: &mut File) -> String {
 /// The process that holds a lock.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LockOwner {
-    /// Its number.
+    /// Its process number.
     pub process: u32,
     /// Name of its machine.
     pub host: String,
 }
 
 impl LockOwner {
-    /// This process.
+    /// Returns the current process.
     fn this() -> Self {
         let kernel = fs::read_to_string("/proc/sys/kernel/hostname").ok();
         let variable = || ["HOSTNAME", "COMPUTERNAME"].iter().find_map(|name| std::env::var(name).ok());
@@ -146,17 +146,17 @@ impl LockOwner {
         Self { process: std::process::id(), host }
     }
 
-    /// The process that a lock file names.
+    /// Reads which process a lock file names.
     fn of(path: &Path) -> Option<Self> {
         Self::parse(&text(&mut File::open(path).ok()?))
     }
 
-    /// The text of the lock file.
+    /// Returns the text of the lock file.
     fn text(&self) -> String {
         format!("process {}\nhost {}\n", self.process, self.host)
     }
 
-    /// Reads the text of a lock file.
+    /// Parses the text of a lock file.
     fn parse(text: &str) -> Option<Self> {
         let mut lines = text.lines();
         let mut value = |key: &str| lines.next()?.strip_prefix(key)?.strip_prefix(' ');
@@ -193,7 +193,7 @@ mod tests {
         assert_eq!(DirectoryLock::holder(directory.path()), Some(Some(owner)));
         drop(lock);
         assert_eq!(DirectoryLock::holder(directory.path()), None);
-        // A dead process left its file without a lock.
+        // A dead process has left its file without a lock.
         fs::write(directory.path().join(LOCK), "process 1\nhost far\n").unwrap();
         let Acquired::Lock(_lock, Some(before)) = DirectoryLock::acquire(directory.path()).unwrap() else { panic!() };
         assert_eq!(before.to_string(), "process 1 on far");

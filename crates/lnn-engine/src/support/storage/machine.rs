@@ -1,24 +1,24 @@
-//! Available memory of the machine, and threads: as many as were requested, or as many as the system starts.
+//! Available memory of the machine, and threads: as many as requested, or as many as the system can start.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::thread::{Builder, scope};
 
-/// Bytes that can be allocated before the machine begins to swap, if the system states it (`MemAvailable` on Linux).
+/// Returns how many bytes can be allocated before the machine starts to swap, if the system reports it (`MemAvailable` on Linux).
 pub fn available_memory() -> Option<u64> {
     parse(&std::fs::read_to_string("/proc/meminfo").ok()?)
 }
 
-/// The line `MemAvailable:   12345 kB`.
+/// Parses the line `MemAvailable:   12345 kB`.
 fn parse(text: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
 }
 
-/// Threads at most: more gain nothing on any machine, and thousands bring it down.
+/// Largest number of threads: more bring no gain on any machine, and thousands overload it.
 pub const MOST_THREADS: usize = 256;
 
-/// Runs `work` on a number of threads at a time, including this one; on fewer if the system starts no more.
+/// Runs `work` on several threads at a time, including this one; on fewer if the system cannot start more.
 fn abreast(threads: usize, work: impl Fn() + Sync) {
     scope(|scope| {
         for _ in 1..threads.min(MOST_THREADS) {
@@ -30,7 +30,7 @@ fn abreast(threads: usize, work: impl Fn() + Sync) {
     });
 }
 
-/// `work` on every item, on this many threads; the results keep the order of the items.
+/// Applies `work` to every item on this many threads; the results keep the order of the items.
 pub fn in_order<T: Sync, R: Send>(items: &[T], threads: usize, work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::with_capacity(items.len()));

@@ -1,8 +1,8 @@
-//! One description and some tensors in a safetensors file with a checksum: the format of model files and checkpoints.
+//! A header and tensors in a safetensors file with a checksum: the format of model files and checkpoints.
 //!
-//! The metadata has one key, whose value is a JSON object with the fields of the description and `checksum`: eight hexadecimal digits, the
+//! The metadata have one key, whose value is a JSON object with the fields of the header and `checksum`: eight hexadecimal digits, the
 //! CRC-32 (IEEE) of that JSON text up to the comma before `"checksum"`, followed by the bytes of the tensors in the order of the file. The
-//! same content gives the same bytes; any changed bit is detected and refused.
+//! same content always gives the same bytes, and a file with a changed bit is rejected.
 
 use crate::names::one_line;
 use crate::scalar::Scalar;
@@ -14,21 +14,21 @@ use std::collections::{HashMap, HashSet};
 use std::fmt;
 use thiserror::Error;
 
-/// Largest description that is read, in bytes.
+/// Size of the largest header that is read, in bytes.
 pub(crate) const MAX_HEADER: u64 = 1 << 20;
 
-/// Marks of the files of one kind.
+/// Identification of one kind of file.
 #[derive(Clone, Copy, Debug)]
 pub struct FileKind {
-    /// In messages: a model, a checkpoint.
+    /// Name in messages, such as model or checkpoint.
     pub name: &'static str,
-    /// The only metadata key: with two, the order of bytes would change from run to run.
+    /// The only metadata key; with two keys, the order of bytes would vary from run to run.
     pub key: &'static str,
-    /// Format that this version writes and reads, the field `format` of the description.
+    /// Format that this version writes and reads, the field `format` of the header.
     pub format: u32,
 }
 
-/// A tensor on its way into a file.
+/// A tensor to be written to a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tensor {
     name: String,
@@ -38,7 +38,7 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    /// Numbers of this shape, rounded to the precision (exact when they came from there).
+    /// Creates a tensor from numbers of this shape, rounded to the precision (exactly, if they were read with that precision).
     pub fn new<S: Scalar>(name: String, shape: Vec<usize>, numbers: &[S], precision: StoredPrecision) -> Self {
         let bytes = match precision {
             StoredPrecision::F32 => numbers.iter().flat_map(|x| x.cast::<f32>().to_le_bytes()).collect(),
@@ -47,7 +47,7 @@ impl Tensor {
         Self { name, shape, dtype: stored_dtype(precision), bytes }
     }
 
-    /// Raw bytes.
+    /// Creates a tensor of raw bytes.
     pub fn bytes(name: String, bytes: Vec<u8>) -> Self {
         Self { name, shape: vec![bytes.len()], dtype: Dtype::U8, bytes }
     }
@@ -64,7 +64,7 @@ pub(crate) fn checksum_field(checksum: u32) -> String {
     format!(",\"checksum\":\"{checksum:08x}\"}}")
 }
 
-/// CRC-32 (IEEE) of the numbers, rounded to the precision, in little-endian bytes.
+/// Computes the CRC-32 (IEEE) of the numbers, rounded to the precision, as little-endian bytes.
 pub fn checksum<'a, S: Scalar>(numbers: impl IntoIterator<Item = &'a S>, precision: StoredPrecision) -> u32 {
     let mut checksum = crc32fast::Hasher::new();
     for x in numbers {
@@ -76,17 +76,17 @@ pub fn checksum<'a, S: Scalar>(numbers: impl IntoIterator<Item = &'a S>, precisi
     checksum.finalize()
 }
 
-/// CRC-32 (IEEE) of a text, eight hexadecimal digits.
+/// Computes the CRC-32 (IEEE) of a text as eight hexadecimal digits.
 pub fn text_checksum(text: &str) -> String {
     format!("{:08x}", crc32fast::hash(text.as_bytes()))
 }
 
-/// The bytes of a file; the description must have the fields `format` and `crate_version`.
+/// Returns the bytes of a file; the header must have the fields `format` and `crate_version`.
 ///
 /// # Errors
 /// [`ContainerError::Header`] or [`ContainerError::NotSafetensors`] for contents that cannot be written.
 pub fn pack(kind: &FileKind, header: &impl Serialize, mut tensors: Vec<Tensor>) -> Result<Vec<u8>, ContainerError> {
-    // The payload in the file is in safetensors' own order.
+    // Sort the payload in the order that safetensors uses.
     tensors.sort_by(|a, b| b.dtype.cmp(&a.dtype).then_with(|| a.name.cmp(&b.name)));
     let text = serde_json::to_string(header).map_err(|e| ContainerError::Header(e.to_string()))?;
     let body = text.strip_suffix('}').unwrap_or(&text);
@@ -102,10 +102,10 @@ pub fn pack(kind: &FileKind, header: &impl Serialize, mut tensors: Vec<Tensor>) 
     safetensors::serialize(views, Some(HashMap::from([(kind.key.to_string(), text)]))).map_err(damaged)
 }
 
-/// Description and tensors of a file; never panics and allocates no more than a small multiple of its bytes.
+/// Parses the header and the tensors of a file; never panics and allocates at most a small multiple of its bytes.
 ///
 /// # Errors
-/// [`ContainerError`] for anything but a whole, undamaged file of this kind and format.
+/// [`ContainerError`] for anything except an undamaged file of this kind and format.
 pub fn unpack<'a, H: DeserializeOwned>(kind: &FileKind, bytes: &'a [u8]) -> Result<(H, Tensors<'a>), ContainerError> {
     check_container(bytes)?;
     let (start, metadata) = SafeTensors::read_metadata(bytes).map_err(damaged)?;
@@ -123,10 +123,10 @@ pub fn unpack<'a, H: DeserializeOwned>(kind: &FileKind, bytes: &'a [u8]) -> Resu
 pub struct Tensors<'a>(SafeTensors<'a>);
 
 impl Tensors<'_> {
-    /// Refuses tensors that are not known.
+    /// Rejects unknown tensors.
     ///
     /// # Errors
-    /// [`ContainerError::ExtraTensor`] naming the first in the order of names.
+    /// [`ContainerError::ExtraTensor`] with the first unknown name in alphabetical order.
     pub fn check_names(&self, known: impl Fn(&str) -> bool) -> Result<(), ContainerError> {
         let mut names = self.0.names();
         names.sort_unstable();
@@ -136,10 +136,10 @@ impl Tensors<'_> {
         }
     }
 
-    /// A tensor of this shape in this precision, converted to `S`: widening is exact, narrowing rounds to nearest.
+    /// Returns a tensor of this shape and precision, converted to `S`: widening is exact, narrowing rounds to nearest.
     ///
     /// # Errors
-    /// It is missing, or has another type or shape.
+    /// The tensor is missing, or has another type or shape.
     pub fn numbers<S: Scalar>(
         &self,
         name: &str,
@@ -155,10 +155,10 @@ impl Tensors<'_> {
         })
     }
 
-    /// Raw bytes.
+    /// Returns a tensor of raw bytes.
     ///
     /// # Errors
-    /// They are missing, or of another type.
+    /// The tensor is missing, or has another type.
     pub fn bytes(&self, name: &str) -> Result<&[u8], ContainerError> {
         let length = self.0.tensor(name).map_or(0, |tensor| tensor.data().len());
         self.data(name, &[length], Dtype::U8, "u8")
@@ -182,7 +182,7 @@ fn damaged(error: safetensors::SafeTensorError) -> ContainerError {
     ContainerError::NotSafetensors(one_line(&error.to_string()))
 }
 
-/// Refuses formats that this version does not read.
+/// Rejects formats that this version cannot read.
 pub(crate) fn check_version(supported: u32, found: u32, writer: &str) -> Result<(), ContainerError> {
     if found == supported {
         return Ok(());
@@ -191,7 +191,7 @@ pub(crate) fn check_version(supported: u32, found: u32, writer: &str) -> Result<
     Err(ContainerError::Version { writer, found, reader, supported })
 }
 
-/// Limits the description before it is parsed, and rejects ambiguous ones.
+/// Limits the size of the header before it is parsed, and rejects ambiguous ones.
 fn check_container(bytes: &[u8]) -> Result<(), ContainerError> {
     let refuse = |text: &str| Err(ContainerError::NotSafetensors(text.to_string()));
     let Some(length) = bytes.first_chunk::<8>().map(|b| u64::from_le_bytes(*b)) else {
@@ -206,9 +206,9 @@ fn check_container(bytes: &[u8]) -> Result<(), ContainerError> {
     }
 }
 
-/// The description, its version and checksum tested first.
+/// Parses the header after checking its version and checksum.
 fn read_header<H: DeserializeOwned>(kind: &FileKind, text: &str, payload: &[u8]) -> Result<H, ContainerError> {
-    /// Part that every version of the format has.
+    /// The fields that every version of the format has.
     #[derive(Deserialize)]
     struct Version {
         format: u32,
@@ -228,7 +228,7 @@ fn read_header<H: DeserializeOwned>(kind: &FileKind, text: &str, payload: &[u8])
     checksum.update(body.as_bytes());
     checksum.update(payload);
     let found = checksum.finalize();
-    // Comparing the text as well refuses digits written in another way.
+    // Comparing the text as well rejects the same digits in another notation.
     if found != expected || field != checksum_field(expected) {
         return Err(ContainerError::Checksum { expected, found });
     }
@@ -237,20 +237,20 @@ fn read_header<H: DeserializeOwned>(kind: &FileKind, text: &str, payload: &[u8])
     serde_json::from_str(&body).map_err(malformed)
 }
 
-/// Why a model file, or another file of the same format, could not be written or read.
+/// The reason why a model file, or another file of the same format, could not be written or read.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ContainerError {
-    /// Missing, not a regular file, too large, or refused by the system.
+    /// The file is missing, not a regular file, too large, or the system reported an error.
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The file could not be written; its previous content is unchanged.
     #[error("cannot write: {0}")]
     Write(std::io::Error),
-    /// Not a safetensors file, or one that is cut off or damaged in its structure.
+    /// The file is not a safetensors file, or it is truncated or its structure is damaged.
     #[error("not a whole safetensors file: {0}")]
     NotSafetensors(String),
-    /// A safetensors file of another program or purpose.
+    /// The safetensors file belongs to another program or purpose.
     #[error("a safetensors file, but not of an lnn {kind} (no {key:?} metadata)")]
     Foreign {
         /// Expected kind, such as a model.
@@ -258,7 +258,7 @@ pub enum ContainerError {
         /// Its metadata key.
         key: &'static str,
     },
-    /// Written by a later version.
+    /// A later version wrote the file.
     #[error("written by lnn {writer} in format {found}; lnn {reader} reads format {supported}")]
     Version {
         /// Version of the crate that wrote the file.
@@ -270,34 +270,34 @@ pub enum ContainerError {
         /// Format that this crate reads.
         supported: u32,
     },
-    /// Bytes changed since the file was written.
+    /// Bytes have changed since the file was written.
     #[error("damaged: checksum {found:08x}, expected {expected:08x}")]
     Checksum {
         /// Checksum in the file.
         expected: u32,
-        /// Checksum of its bytes.
+        /// Checksum computed from its bytes.
         found: u32,
     },
-    /// The description makes no sense.
+    /// The header is inconsistent.
     #[error("description: {0}")]
     Header(String),
     /// A tensor of the architecture is missing.
     #[error("tensor {0} is missing")]
     MissingTensor(String),
-    /// A tensor that the architecture does not know.
+    /// The architecture does not contain this tensor.
     #[error("tensor {0} does not belong to this architecture")]
     ExtraTensor(String),
-    /// A tensor has another number type than the description states.
+    /// The number type of a tensor differs from the header.
     #[error("tensor {name}: expected {expected}, found {found}")]
     WrongType {
         /// Name of the tensor.
         name: String,
-        /// Type in the description.
+        /// Type in the header.
         expected: &'static str,
         /// Type in the file.
         found: String,
     },
-    /// A tensor has another shape than the architecture states.
+    /// The shape of a tensor differs from the architecture.
     #[error("tensor {name}: expected shape {expected:?}, found {found:?}")]
     WrongShape {
         /// Name of the tensor.
@@ -315,12 +315,12 @@ pub enum ContainerError {
         /// Index in the tensor, row-major from 0.
         index: usize,
     },
-    /// The number of weights is not that of the architecture.
+    /// The number of weights differs from the architecture.
     #[error("expected {expected} weights, found {found}")]
     WrongLength {
-        /// By the architecture.
+        /// Number of weights in the architecture.
         expected: usize,
-        /// Given.
+        /// Number of given weights.
         found: usize,
     },
 }
@@ -380,7 +380,7 @@ impl<'de> Visitor<'de> for Unambiguous {
     }
 }
 
-/// Number type of stored numbers.
+/// Number type in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum StoredPrecision {
@@ -391,11 +391,11 @@ pub enum StoredPrecision {
 }
 
 impl StoredPrecision {
-    /// The precision of a number type, if files support it.
+    /// Returns the precision of a number type, if files support it.
     pub fn of<S: Scalar>() -> Option<Self> {
         [Self::F32, Self::F64].into_iter().find(|precision| precision.name() == S::NAME)
     }
-    /// `"f32"` or `"f64"`.
+    /// Returns `"f32"` or `"f64"`.
     pub fn name(self) -> &'static str {
         match self {
             Self::F32 => "f32",
