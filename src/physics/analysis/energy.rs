@@ -84,7 +84,7 @@ pub struct EnergyLoss {
     pub per_second: f64,
     /// Its standard error, from the scatter between stretches.
     pub error: f64,
-    /// Share of the stretches that lose energy.
+    /// Fraction of the segments that lose energy.
     pub losing: f64,
     /// Stretches examined.
     pub stretches: usize,

@@ -11,7 +11,7 @@
 //! let found = mass_matrix_error(&*exact, &*heavy, &[0.0, 0.0, 1.0, 0.2, -2.0, 1.5]); // at three positions
 //! assert!(found.error.count == 3 && found.error.max < 0.01);
 //!
-//! // How far its motion is from keeping the exact energy, relative to 1 J at least.
+//! // Drift of the exact energy along the model's motion, relative to at least 1 J.
 //! let motion = rollout(&*heavy, &[1.0, 0.5], &[0.0, 0.0], &RolloutOptions::new(5.0, 0.1)).complete()?;
 //! let error = energy_error(&*exact, &motion, 1.0);
 //! assert!(error.error.iter().all(|e| *e < 0.05) && error.error.iter().any(|e| *e > 1e-4));

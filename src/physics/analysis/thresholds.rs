@@ -60,7 +60,7 @@ pub(super) const CONSERVED_RATE: f64 = 1.0 / 3.0;
 /// without any coupling that miss 7 to 29 % of held-out accelerations show influences of 0.05 to 0.23, below twice that error, and networks
 /// of coupled motion that miss 4 to 11 % show 0.18 to 0.32.
 pub(super) const LEAST_INFLUENCE: f64 = 0.1;
-/// Share of a range by which a state may lie outside it.
+/// Fraction of a range by which a state may lie outside the range.
 pub(super) const OUTSIDE_MARGIN: f64 = 0.05;
 /// Groups of consecutive states for the jackknife, each long enough to be independent of the others.
 pub(super) const JACKKNIFE_GROUPS: usize = 20;
@@ -109,7 +109,7 @@ pub(super) const START_CORRECTIONS: usize = 4;
 pub(super) const EXAMINED_WEIGHTS: usize = 128;
 /// Step of a central difference by a parameter, over its size: its truncation error is 1e-8.
 pub(super) const PARAMETER_STEP: f64 = 1e-4;
-/// Share of a column that must be independent of others for it to count.
+/// Smallest independent fraction at which a column counts.
 pub(super) const INDEPENDENT_COLUMN: f64 = 1e-10;
 
 // ---- Predictions and tubes ----

@@ -63,7 +63,7 @@ pub struct TrajectoryTest<S> {
     pub atol: f64,
     /// Steps after which a learned motion is abandoned.
     pub max_steps: usize,
-    /// Where the learned motion must stay; `None` lets it go anywhere.
+    /// Region in which the learned motion must stay; `None` sets no limit.
     pub domain: Option<Domain<S>>,
     /// `true` to estimate Lyapunov exponents of the exact motion.
     pub lyapunov: bool,

@@ -37,11 +37,11 @@ pub struct Arena {
 /// Numbers side by side, with the requested functions of them.
 struct Pack {
     layout: Layout,
-    /// Functions of all its numbers that were requested.
+    /// Requested functions of all numbers in the pack.
     functions: Vec<(Function, u32)>,
 }
 
-/// Where the coefficients of a pack are.
+/// Range of the coefficients of a pack.
 #[derive(Clone, Copy)]
 struct Layout {
     /// The first one.

@@ -138,11 +138,11 @@ pub struct Certificate {
     /// The largest condition number that was allowed.
     #[cfg_attr(feature = "serde", serde(rename = "condition"))]
     pub limit: Option<f64>,
-    /// Share in which every state is proven to satisfy the conditions.
+    /// Fraction of the region in which every state is proven to satisfy the conditions.
     pub certified: f64,
-    /// Share in which every state is proven to violate them.
+    /// Fraction of the region in which every state is proven to violate the conditions.
     pub refuted: f64,
-    /// Share in which neither is proven.
+    /// Fraction of the region in which neither is proven.
     pub open: f64,
     /// Boxes evaluated.
     pub boxes: usize,

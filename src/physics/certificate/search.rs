@@ -10,7 +10,7 @@ use std::fmt::{Debug, Formatter};
 use std::sync::atomic;
 use std::time::{Duration, Instant};
 
-/// What is proven about a box.
+/// Verdict on a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     /// Every state has the signature, and a condition number of at most `condition`.
@@ -39,7 +39,7 @@ pub struct Tree {
 }
 
 impl Debug for Tree {
-    /// The number of boxes: there may be millions.
+    /// Number of boxes, which may reach millions.
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
         write!(f, "Tree of {} boxes", self.nodes.len())
     }
@@ -49,7 +49,7 @@ impl Debug for Tree {
 struct Waiting {
     node: usize,
     bounds: Vec<(f64, f64)>,
-    /// Share of the whole region.
+    /// Fraction of the whole region that the box covers.
     share: f64,
     /// Estimated number of halvings until its parts are decided, from the spectrum of its parent.
     halvings: f64,
@@ -201,7 +201,7 @@ fn active_axes(source: &dyn Enclose, regions: &[(Vec<(f64, f64)>, f64)]) -> Vec<
     active
 }
 
-/// Where and how often to cut a box.
+/// Chooses the axes along which to cut a box, and the number of cuts.
 struct Cut<'a> {
     /// For every axis, how much the matrix changes along it in the part that is cut next.
     influence: Vec<f64>,

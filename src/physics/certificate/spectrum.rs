@@ -274,7 +274,7 @@ fn mass_matrix<'a, L: Lagrangian>(
     let state: Vec<Number<'a>> = bounds.iter().enumerate().map(side).collect();
     let found = lagrangian.lagrangian(parameters, &state[..n], &state[n..]);
     let mut forms = vec![[0.0]; n * n * stride];
-    // A Lagrangian that may be undefined in the box, or that may branch on a value.
+    // The Lagrangian may be undefined in the box, or branch on a value.
     let known = found.range().is_bounded() && !arena.was_read();
     for (k, out) in forms.chunks_exact_mut(stride).enumerate() {
         match found {
@@ -294,7 +294,7 @@ fn mass_matrix<'a, L: Lagrangian>(
 /// Parameters are enclosed; constants in the Lagrangian's own code are the `f64` numbers that it names.
 ///
 /// # Panics
-/// If there are not `n` pairs of each.
+/// Panics unless both contain `n` pairs.
 #[cfg(test)]
 pub(crate) fn mass_matrix_enclosure<L: Lagrangian, S: Scalar>(
     lagrangian: &L,

@@ -206,7 +206,7 @@ fn what_is_not_decided_stays_open() {
     let kink = open("x_dot^2 + y_dot^2 + abs(x_dot)");
     assert!(kink.certified > 0.9 && kink.open > 0.0 && kink.refuted == 0.0, "{kink:?}");
     assert_eq!(kink.verdict(&[0.3, 0.2], &[0.0, 0.2]), Verdict::Open);
-    // Where L is undefined.
+    // A region where L is undefined.
     let undefined = open("x_dot^2*exp(sqrt(x)) + y_dot^2");
     assert!(undefined.certified < 0.5 && undefined.certified > 0.4 && undefined.refuted == 0.0, "{undefined:?}");
     let potential = open("x_dot^2 + y_dot^2 - ln(y)");

@@ -79,7 +79,7 @@ impl Colour {
         Self { sigma: gamma.sqrt(), rho, slack: most / gamma }
     }
 
-    /// How many samples count as one independent sample in a mean square.
+    /// Number of correlated samples that equal one independent sample in a mean square.
     pub fn shared(self) -> f64 {
         (1.0 + self.rho * self.rho) / (1.0 - self.rho * self.rho)
     }

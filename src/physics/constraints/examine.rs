@@ -13,17 +13,17 @@ pub struct ExaminedLagrangian {
     pub system: String,
     /// Names of the coordinates.
     pub coordinates: Vec<String>,
-    /// Number of its constraints.
+    /// Number of constraints.
     pub count: usize,
-    /// Each of them.
+    /// The constraints of the system.
     pub constraints: Vec<OwnConstraint>,
-    /// Constraints that follow from the others.
+    /// Redundant constraints, which follow from the others.
     pub redundant: Vec<String>,
     /// Largest number of degenerate directions at a state.
     pub open: usize,
     /// States that were examined.
     pub states: usize,
-    /// Number of these with degenerate directions.
+    /// Number of examined states with degenerate directions.
     pub open_states: usize,
     /// The degenerate directions at a state with the most of them.
     pub null_directions: Vec<Vec<f64>>,

@@ -20,7 +20,7 @@ const STUDENT: f64 = 2.365;
 /// Largest ratios of variances at which a combination vanishes, and at which it does so within the noise.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Largest ratio at which it vanishes.
+    /// Largest ratio at which a combination counts as vanishing.
     pub taken: f64,
     /// Largest ratio at which only noise remains. The ratio of pure noise has the standard deviation `sqrt(2/N)`, where `N` is the number of
     /// samples with independent noise; the noise itself is known from differences to about `sqrt(6/N)`.
@@ -50,7 +50,7 @@ pub struct Generator {
     /// Factors of all terms; the leading term has 1.
     pub weights: Vec<f64>,
     lead: usize,
-    /// Half widths of their ranges.
+    /// Half-widths of the confidence intervals of the factors.
     spread: Vec<f64>,
     /// `c.G c / c.N c`.
     ratio: f64,
@@ -73,7 +73,7 @@ pub struct Vanishing<'a> {
     moments: Moments,
     whole: Pencil,
     centred: bool,
-    /// Samples whose errors are independent.
+    /// Number of samples with independent errors.
     independent: f64,
     limits: Limits,
     levels: Vec<Level>,
@@ -116,7 +116,7 @@ impl<'a> Vanishing<'a> {
             let left = |&term: &usize| {
                 let follows =
                     || known.is_some_and(|known| known.divides(features, term)) || found.divides(features, term);
-                // The constant is always constant.
+                // The constant term is trivially constant along trajectories.
                 features.degree(term) <= degree && !(centred && features.is_constant(term)) && !follows()
             };
             let level = found.level((0..p).filter(left).collect(), degree);
@@ -351,7 +351,7 @@ fn leading(features: &Features, support: &[usize], raw: &[f64]) -> usize {
 }
 
 impl Generator {
-    /// The terms it contains.
+    /// Terms with nonzero factors.
     pub fn terms(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.weights.len()).filter(|&term| self.weights[term] != 0.0)
     }
@@ -377,7 +377,7 @@ impl Generator {
         self.spread.iter().all(|spread| *spread < UNDETERMINED_FACTOR * most)
     }
 
-    /// The highest degree of its terms.
+    /// The highest degree of the terms.
     pub fn degree(&self, features: &Features) -> i32 {
         self.terms().map(|term| features.degree(term)).max().unwrap_or(0)
     }

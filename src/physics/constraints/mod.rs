@@ -94,7 +94,7 @@ pub struct FoundConstraint {
     pub coefficients: BTreeMap<String, f64>,
     /// 95 % confidence intervals of the factors.
     pub range: BTreeMap<String, [f64; 2]>,
-    /// Root mean square defect over that of noise.
+    /// Root mean square of the residual, relative to that of the noise.
     pub defect: f64,
 }
 
@@ -141,15 +141,15 @@ pub enum ConstraintSearchError {
     /// Too many terms.
     #[error("{what} gives {found} terms, at most {MOST_TERMS} can be searched together")]
     Terms {
-        /// The kind of terms that are too many.
+        /// Kind of the terms.
         what: &'static str,
-        /// Their number.
+        /// Number of terms.
         found: usize,
     },
     /// Fewer samples than terms need.
     #[error("{found} samples are too few for {terms} terms, expected {needed} at least")]
     Samples {
-        /// Terms.
+        /// Number of terms.
         terms: usize,
         /// Samples found.
         found: usize,
@@ -301,7 +301,7 @@ struct RowsTaken {
 }
 
 impl RowsTaken {
-    /// No constraints.
+    /// Starts without constraints.
     fn at(samples: &MotionSamples, places: usize) -> Self {
         let places = samples.places(places);
         Self { bases: vec![Vec::new(); places.len()], places, refuted: 0 }

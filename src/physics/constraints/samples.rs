@@ -22,7 +22,7 @@ pub struct MotionSamples {
     starts: Vec<usize>,
     /// Number of samples that share the errors of their velocities.
     shared: f64,
-    /// Cancels a search in them.
+    /// Cancels a search that uses these samples.
     pub(super) cancellation: Cancellation,
     /// Number of samples that share the errors of their positions, and how much larger the variance of their noise may be.
     shared_positions: f64,
@@ -36,7 +36,7 @@ pub struct MotionSamples {
 }
 
 impl MotionSamples {
-    /// From a recording: measured positions, with velocities that are measured or smoothed.
+    /// Takes measured positions from a recording, with measured or smoothed velocities.
     ///
     /// # Errors
     /// [`SmoothError`] for trajectories that are too short to estimate their noise.
@@ -88,7 +88,7 @@ impl MotionSamples {
         Ok(samples)
     }
 
-    /// From a recording of exact positions and velocities, whose trajectories may have any length.
+    /// Takes exact positions and velocities from a recording; trajectories may have any length.
     ///
     /// # Errors
     /// [`SmoothError::Shape`] for a trajectory without velocities.
@@ -157,7 +157,7 @@ impl MotionSamples {
     pub(super) fn moves(&self, i: usize) -> bool {
         self.still.iter().all(|(still, _)| *still != i)
     }
-    /// Columns that do not move, in words.
+    /// Describes the columns that do not move.
     pub(super) fn still(&self) -> BTreeMap<String, String> {
         self.still.iter().map(|(i, how)| (self.names[*i].clone(), how.clone())).collect()
     }

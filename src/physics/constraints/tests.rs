@@ -1,4 +1,4 @@
-//! Constraints found in states whose constraints are known.
+//! Tests of the constraint search on motions whose constraints are known.
 
 use super::*;
 use crate::recording::smooth::SmoothOptions;
@@ -7,7 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeSet;
 
-/// Coordinates and velocities at a time.
+/// Coordinates and velocities as functions of time.
 type Path = Box<dyn Fn(f64) -> (Vec<f64>, Vec<f64>)>;
 
 /// A recording of motions `t -> (q, v)`, with noise of a share of the size of all positions.
@@ -46,7 +46,7 @@ fn found(recording: &Recording) -> FoundConstraints {
     find_constraints(&samples, ConstraintSearch::default()).unwrap()
 }
 
-/// Two rods, of 1 and 0.8: angles that turn evenly.
+/// The joints of two rods of lengths 1 and 0.8 that turn at constant rates.
 fn two_rods(rng: &mut ChaCha8Rng) -> Path {
     let [a, b, da, db]: [f64; 4] = [0; 4].map(|_| 3.0 * rng.random::<f64>() - 1.5);
     Box::new(move |t| {
@@ -66,7 +66,7 @@ fn rods_are_found_at_any_noise_with_their_lengths() {
         let kinds: Vec<ConstraintKind> = found.constraints.iter().map(|c| c.kind).collect();
         assert_eq!((found.count, kinds), (2, vec![ConstraintKind::Holonomic; 2]), "{noise}: {found:?}");
         assert!(found.gap.unwrap() > 5.0 && found.trajectories == 24 && found.refuted == 0);
-        // Further degrees add products of these, and nothing else.
+        // Higher degrees only add products of these functions.
         let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
         let further =
             find_constraints(&samples, ConstraintSearch { degree: 4, ..ConstraintSearch::default() }).unwrap();
@@ -81,7 +81,7 @@ fn rods_are_found_at_any_noise_with_their_lengths() {
     }
 }
 
-/// A rotation matrix that turns about axes of its own.
+/// A rotation matrix whose axis changes with time.
 fn rotation(rng: &mut ChaCha8Rng) -> Path {
     let [a, b, c, da, db, dc]: [f64; 6] = [0; 6].map(|_| 4.0 * rng.random::<f64>() - 2.0);
     Box::new(move |t| {
@@ -174,7 +174,7 @@ fn what_follows_from_linear_functions_is_not_found_again() {
     }
 }
 
-/// A disk of radius 0.5 that turns and rolls at rates of its own.
+/// A disk of radius 0.5 that turns and rolls at independent rates.
 fn rolling_disk(rng: &mut ChaCha8Rng) -> Path {
     let [x, y, heading, turn, speed]: [f64; 5] = [0; 5].map(|_| 4.0 * rng.random::<f64>() - 2.0);
     let turn = turn + 0.3 * turn.signum();
@@ -201,7 +201,7 @@ fn rolling_is_nonholonomic_and_what_it_conserves_is_not_imposed() {
         let rolled: Vec<f64> = rows.filter(|(term, _)| term.ends_with("phi_dot")).map(|(_, c)| c.abs()).collect();
         assert!(!rolled.is_empty() && rolled.iter().all(|c| (c - 0.5).abs() < 0.005), "{found:?}");
     }
-    // Points on circles of radii of their own.
+    // Points on circles of different radii.
     let mut circle = |rng: &mut ChaCha8Rng| -> Path {
         let [r, turn]: [f64; 2] = [0; 2].map(|_| 1.0 + rng.random::<f64>());
         let phase: f64 = 6.0 * rng.random::<f64>();
@@ -268,7 +268,7 @@ fn too_few_samples_and_too_many_terms_are_refused() {
     assert!(matches!(few, Err(ConstraintSearchError::Samples { terms: 70, .. })), "{few:?}");
 }
 
-/// A rod of 1 whose angle swings.
+/// The end of a rod of length 1 that swings.
 fn rod(rng: &mut ChaCha8Rng) -> impl Fn(f64) -> (f64, f64) + 'static {
     let [a, da, w]: [f64; 3] = [0; 3].map(|_| 2.0 * rng.random::<f64>() - 1.0);
     move |t| (3.0 * a + 2.0 * da * t + (1.5 * t + w).sin()).sin_cos()

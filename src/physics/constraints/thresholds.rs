@@ -31,7 +31,7 @@ pub(super) const LEAST_NEW_PART: f64 = 0.15;
 /// Share of the states at which a function that vanishes must have a part outside the span of the constraints found so far, and the smallest
 /// size of that part.
 pub(super) const NEW_FUNCTION: (f64, f64) = (0.1, 0.1);
-/// The same for further candidates, whose noise is larger.
+/// The same size for additional candidates, whose noise is larger.
 pub(super) const FURTHER_CANDIDATE: (f64, f64) = (0.5, LEAST_NEW_PART);
 /// Smallest part outside the span, over the largest one, at which a simpler candidate is taken first.
 pub(super) const SIMPLER_PART: f64 = 0.5;
@@ -39,11 +39,11 @@ pub(super) const SIMPLER_PART: f64 = 0.5;
 pub(super) const NEARLY_DEPENDENT: f64 = 0.1;
 /// The curl of a row within its kernel counts as noise below this share of its derivatives.
 pub(super) const MOST_CURL: f64 = 0.03;
-/// Share of the gradients that must have the same directions everywhere.
+/// Fraction of the gradients that must share the same directions.
 pub(super) const COMMON_DIRECTIONS: f64 = 0.99;
 /// Largest deviation of a ratio of gradients from a whole number.
 pub(super) const WHOLE_NUMBER_ERROR: f64 = 0.05;
-/// Integer multiples of an angle that are tried.
+/// Largest integer multiple of an angle that is tried.
 pub(super) const ANGLE_MULTIPLES: std::ops::RangeInclusive<u32> = 1..=12;
 /// Smallest square of a gradient, over its mean square, at which its direction is more than noise.
 pub(super) const VISIBLE_GRADIENT: f64 = 1e-2;
@@ -66,11 +66,11 @@ pub(super) const COLOURED_MISFIT: f64 = 12.0;
 pub(super) const ALLOWED_MISFIT: f64 = 40.0;
 /// Largest mean square of differences, relative to that at distance 1, at which the noise is visible beside the motion.
 pub(super) const MOST_MOTION_SQUARE: f64 = 40.0;
-/// Distances of samples that are compared.
+/// Lags, in samples, at which differences are compared.
 pub(super) const COMPARED_DISTANCES: std::ops::RangeInclusive<usize> = 1..=12;
 /// Smallest number of differences that is used.
 pub(super) const LEAST_DIFFERENCES: usize = 64;
-/// Noise of up to this many roundings of the largest number is that of exact numbers.
+/// Noise up to this multiple of the rounding error of the largest number means that the data are exact.
 pub(super) const EXACT_ROUNDINGS: f64 = 16.0;
 
 // # Limits of work
@@ -91,7 +91,7 @@ pub(super) const INDEPENDENCE_STATES: usize = 256;
 pub const EXAMINED_STATES: usize = 64;
 /// Shares of the largest weight below which several terms are removed at a time.
 pub(super) const REMOVED_SHARES: [f64; 5] = [0.1, 0.03, 0.01, 3e-3, 1e-3];
-/// Terms are removed one by one if there are at most this many.
+/// Number of terms up to which terms are removed one at a time.
 pub(super) const MOST_TERMS_REMOVED_SINGLY: usize = 40;
 /// Rounds of reweighted least squares for combinations of few terms.
 pub(super) const REWEIGHTING_ROUNDS: usize = 12;

@@ -345,7 +345,7 @@ mod tests {
         let wave = |om: f64| (0..50).map(|k| (om * f64::from(k)).cos()).collect::<Vec<f64>>();
         let (a, b) = (wave(0.3), wave(0.8));
         let mut left: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 2.0 * a - 3.0 * b).collect();
-        // The third column has no part of its own.
+        // The third column depends on the first two.
         let sum = a.iter().zip(&b).map(|(a, b)| a + b).collect();
         let directions = remove(&mut left, [a, b, sum].into_iter());
         assert!(directions.len() == 2 && left.iter().all(|x| x.abs() < 1e-12), "{left:?}");
@@ -353,7 +353,7 @@ mod tests {
 
     #[test]
     fn a_line_that_another_term_hides_is_found() {
-        // A term contains the drive and two oscillations; without it, the residuals contain a part of each.
+        // The term contains the drive and two oscillations; removing it leaves a part of each.
         let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
         let wave = |om: f64, size: f64| times.iter().map(|t| size * (om * t).cos()).collect::<Vec<f64>>();
         let (drive, others) = (wave(1.3, 1.0), [wave(1.9, 1.2), wave(2.7, 0.8)]);

@@ -32,7 +32,7 @@ pub enum FormulaError {
     Function {
         /// The function.
         text: String,
-        /// What is wrong.
+        /// Description of the error.
         problem: String,
     },
     /// A term that gives the scale but is not in the formula.
@@ -48,7 +48,7 @@ pub enum FormulaError {
     Still {
         /// The coordinate.
         coordinate: String,
-        /// How it stands still.
+        /// Description of how the coordinate stays constant.
         how: String,
     },
     /// A coordinate that keeps its value except for a few large steps.
@@ -98,7 +98,7 @@ pub enum FormulaError {
         formulas.iter().map(|formula| format!("{formula} = 0")).collect::<Vec<_>>().join(" and ")
     )]
     Constrained {
-        /// What vanishes.
+        /// The formula that vanishes.
         formulas: Vec<String>,
     },
     /// Every choice of terms has a singular mass matrix.

@@ -41,7 +41,7 @@ impl Search<'_> {
                 let mut tried = proposal.model;
                 let mut starts = segments.clone();
                 for rounds in [0, CHOICES_AFTER_EXCHANGE] {
-                    // With all terms, and without those that the exchange has made superfluous.
+                    // Tries all terms, then only those that are still needed after the exchange.
                     self.converge(&mut tried, &mut starts, rounds);
                     if tried.terms.len() == model.terms.len() && tried.terms.iter().all(|k| model.terms.contains(k)) {
                         break;

@@ -24,7 +24,7 @@ pub enum Verdict {
     Undecided,
 }
 
-/// Another formula that was tried.
+/// An alternative formula that the search tried.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rival {
     /// Its terms.
@@ -55,7 +55,7 @@ pub struct FoundTerm {
     pub constant: String,
     /// Unit of the coefficient; none if the function of the term contains a constant with a unit.
     pub unit: Option<String>,
-    /// Share of the bootstrap samples in which it was chosen.
+    /// Fraction of the bootstrap samples in which the search chose the term.
     pub probability: f64,
     /// `true` for a term of Rayleigh's dissipation function, `false` for one of the Lagrangian.
     pub dissipation: bool,

@@ -330,7 +330,7 @@ impl Library {
     }
 }
 
-/// Groups of `n` coordinates, by lists of those that are coupled.
+/// Partitions `n` coordinates into groups, given lists of coupled coordinates.
 pub(super) fn blocks<'a>(n: usize, joined: impl IntoIterator<Item = &'a [usize]>) -> Vec<Vec<usize>> {
     let pairs = joined.into_iter().flat_map(|list| list.windows(2).map(|pair| (pair[0], pair[1])));
     linalg::components(n, pairs)
@@ -343,7 +343,7 @@ struct Sum<'a> {
 }
 
 impl Lagrangian for Sum<'_> {
-    /// If there is a drive, the time comes last.
+    /// Time is the last variable if the system is driven.
     fn coordinates(&self) -> usize {
         self.library.n() + self.library.known()
     }

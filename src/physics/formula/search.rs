@@ -129,7 +129,7 @@ impl Search<'_> {
 
 /// Bootstrap results for each candidate.
 pub(super) struct Resampled {
-    /// Share of the bootstrap samples that keep it.
+    /// Fraction of the bootstrap samples that keep the term.
     pub share: BTreeMap<usize, f64>,
     /// Its coefficients, 0 where it is removed.
     pub coefficients: BTreeMap<usize, Vec<f64>>,

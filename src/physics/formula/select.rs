@@ -316,7 +316,7 @@ impl Search<'_> {
     }
 }
 
-/// Takes over a choice if it is better than the one of the same size.
+/// Stores a choice if it is better than the current choice of the same size.
 fn improve(best: &mut BTreeMap<usize, Choice>, choice: Choice) -> bool {
     let known = best.get(&choice.set.len()).map_or(f64::INFINITY, |known| known.error);
     let better = choice.error < known * (1.0 - CHOICE_TIE);

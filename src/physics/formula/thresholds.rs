@@ -86,9 +86,9 @@ pub(super) const CHANCE_FRACTION: f64 = 0.02;
 
 // # Held-out data and resampling
 
-/// One block in this many is held out.
+/// One in this number of blocks is held out.
 pub(super) const BLOCKS_PER_HELD_OUT: usize = 5;
-/// One state of a model in this many is used for validation alone.
+/// One in this number of model states is used only for validation.
 pub(super) const STATES_PER_HELD_OUT: usize = 5;
 /// Smallest number of trajectories at which whole trajectories are held out; fewer are cut into pieces.
 pub(super) const LEAST_WHOLE_TRAJECTORIES: usize = 5;

@@ -55,7 +55,7 @@ pub(super) struct Units {
     time: Dimension,
 }
 
-/// Unit of coordinates that are not angles and have no unit of their own.
+/// Default unit of coordinates that are not angles.
 const UNKNOWN: &str = "[q]";
 
 impl Units {

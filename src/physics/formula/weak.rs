@@ -402,7 +402,7 @@ impl SampledTerms {
 pub(super) struct Group {
     /// Indices of the terms in the set.
     pub places: Vec<usize>,
-    /// Share of the coordinates.
+    /// Fraction of the coordinates.
     pub share: f64,
 }
 

@@ -137,7 +137,7 @@ pub fn geometries<S: Scalar>(
     Ok(model.metric_jets(points, &velocities)?.iter().map(Geometry::new).collect())
 }
 
-/// Why there is no geometry at a point.
+/// Reason why the geometry is undefined at a point.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum GeometryError {
@@ -164,7 +164,7 @@ pub enum GeometryError {
     TooMany {
         /// Coordinates of the model.
         found: usize,
-        /// Coordinates that there may be.
+        /// Allowed numbers of coordinates.
         most: usize,
     },
     /// The model refused.

@@ -14,7 +14,7 @@ const DIGITS: usize = 7;
 /// A component below this many roundings of the largest one, in directions of unit length, counts as zero.
 const ROUNDINGS: f64 = 64.0;
 
-/// What is known of the geometry at a point.
+/// Report on the geometry at a point.
 pub struct PointReport<'a, S> {
     /// Names of the coordinates.
     pub names: &'a [String],
@@ -22,7 +22,7 @@ pub struct PointReport<'a, S> {
     pub quantities: Vec<Quantity<S>>,
     /// Lengths of the coordinate directions, `sqrt(max_j |g_ij|)`, `(n)`: components are compared after division by them.
     lengths: Vec<f64>,
-    /// Why there is no geometry, if there is none.
+    /// Reason why the geometry is undefined, if it is.
     pub problem: Option<String>,
 }
 

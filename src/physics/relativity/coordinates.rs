@@ -295,7 +295,7 @@ pub fn time_moves_alone(model: &dyn EulerLagrange<f64>, chart: Chart, distance: 
     let v: Vec<f64> = (0..q.len()).map(|k| (1.0 + 2.4 * k as f64).cos()).collect();
     let accelerations = |q: &[f64], v: &[f64]| {
         let mut terms = Terms::default();
-        // Where the metric is invalid, nothing is compared.
+        // Points where the metric is invalid are skipped.
         let _ = model.terms(q, v, Request::ACCELERATION, &mut terms);
         terms.acceleration
     };

@@ -56,7 +56,7 @@ pub use {
 use crate::geometry::GeometryError;
 use crate::lagrangian::MechanicsError;
 
-/// Why there is no picture.
+/// Reason why no picture can be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RelativityError {

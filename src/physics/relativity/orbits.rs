@@ -59,7 +59,7 @@ pub(super) fn passing(
 /// integrated from the first sample.
 ///
 /// # Errors
-/// Where the motion between the samples fails.
+/// The point between samples at which the motion fails.
 pub(super) fn zero(
     model: &dyn EulerLagrange<f64>,
     [from, to]: &[MotionState; 2],

@@ -114,9 +114,9 @@ pub struct ViewSummary {
 /// Differences of two views.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ViewDifference {
-    /// Share of the pixels with another colour.
+    /// Fraction of the pixels whose colours differ.
     pub pixels: f64,
-    /// Share of the pixels in the shadow of one alone.
+    /// Fraction of the pixels in the shadow of only one picture.
     pub shadow: f64,
     /// Median of the angles between places on the sky, in degrees.
     pub median_angle: f64,

@@ -63,7 +63,7 @@ pub(super) fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 impl Shadow {
-    /// Share of the pixels that belong to the shadow.
+    /// Fraction of the pixels that belong to the shadow.
     pub(crate) fn share(&self) -> f64 {
         self.count(|fate| fate == RayOutcome::Captured) as f64 / self.rays.len() as f64
     }

@@ -228,7 +228,7 @@ fn rays_that_do_not_end_are_unfinished() {
     let camera = small(10.0, 1.0);
     let seen = shadow(&*model, &camera, &Tracing { most_steps: 2, ..Tracing::of(&camera) }, &|_| ()).unwrap();
     assert_eq!((seen.unfinished(), seen.share()), (600, 0.0));
-    // At the origin of the coordinates there is no valid metric.
+    // The metric is invalid at the origin of the coordinates.
     let start = ([0.0; 4], scaled(2.0, [0.0, 1.0, 0.0, 0.0]));
     let tracing = Tracing::of(&camera);
     let rays =

@@ -59,7 +59,7 @@ pub(super) const ELLIPSE_RECTUM: f64 = 12.0;
 pub(super) const WHIRL_HALVINGS: usize = 24;
 /// Relative excess of the whirl over the semilatus rectum of that orbit.
 pub(super) const WHIRL_EXCESS: f64 = 3e-3;
-/// Share of its apastron that an orbit must reach to come back.
+/// Fraction of the apastron radius that an orbit must reach to count as having returned.
 pub(super) const REACHED_APASTRON: f64 = 0.99;
 /// Angular velocity of a plunge over that of the circular orbit.
 pub(super) const PLUNGE_VELOCITY: f64 = 0.6;

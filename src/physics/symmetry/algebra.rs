@@ -111,7 +111,7 @@ struct FieldsAt {
     slopes: Vec<Vec<f64>>,
 }
 
-/// Fields at about this many states, spread over the sample.
+/// Number of states, spread over the sample, at which fields are compared.
 fn vectors(sample: &Sample, basis: &Basis, fields: &[Field], states: usize) -> Vec<FieldsAt> {
     let (n, spread) = (sample.n, sample.spread());
     let step = (sample.len() / states).max(1);

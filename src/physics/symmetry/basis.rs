@@ -111,7 +111,7 @@ enum Factor {
     Throat(u32, u32),
 }
 
-/// Families of functions with degrees of their own.
+/// Families of functions, each with a separate degree.
 const FAMILIES: usize = 3;
 
 impl Degrees {
@@ -250,7 +250,7 @@ impl Basis {
     /// All products of factors of coordinates `names` with these charts up to these degrees.
     ///
     /// # Panics
-    /// If there are not as many names as charts.
+    /// Panics if the numbers of names and charts differ.
     pub fn new(names: &[String], charts: &[Chart], degrees: Degrees) -> Self {
         assert_eq!(names.len(), charts.len(), "a chart for every coordinate");
         let factors: Vec<Vec<Factor>> = charts.iter().map(|chart| Factor::all(*chart, degrees)).collect();
@@ -321,7 +321,7 @@ impl Basis {
     /// Functions up to these degrees, unless they are too many, or the usual ones of the charts, with their degrees.
     ///
     /// # Errors
-    /// What was expected.
+    /// Description of the expected input.
     pub fn within(names: &[String], charts: &[Chart], degrees: Option<Degrees>) -> Result<(Self, Degrees), String> {
         let Some(degrees) = degrees else { return Ok(Self::usual(names, charts)) };
         let unknowns = unknowns(charts.len(), Self::count(charts, degrees));

@@ -135,7 +135,7 @@ fn positive<S: Scalar>(n: usize, matrix: &[S], signs: Inertia) -> bool {
 /// assert_eq!((terms.lagrangian[0], terms.momentum.as_slice()), (0.0, &[0.0, 0.0][..]));
 /// let m = &terms.mass_matrix;
 /// assert!((m[0] * m[3] - m[1] * m[2] - 1.0).abs() < 1e-14);
-/// // Normal again, there is nothing left to change.
+/// // A Lagrangian in normal form does not change again.
 /// let again = CanonicalForm::at(&canonical, &q0, &v0)?;
 /// assert!((again.factor - 1.0).abs() < 1e-14);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

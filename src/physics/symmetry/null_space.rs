@@ -464,7 +464,7 @@ mod tests {
         assert_eq!(at(&[1e-4, 2e-3, 3e-3, 0.2], None).count, Some(3));
         // Imposed symmetries next to learned ones.
         assert_eq!(at(&[0.0, 1e-9, 2e-3, 0.05], None).count, Some(3));
-        // A value that stands out only from two exact ones may still be noise.
+        // A value that exceeds only two exact zeros may still be noise.
         assert_eq!(at(&[1e-6, 2e-6, 4e-3, 0.02], None).count, None);
         assert_eq!(at(&[1e-3, 5e-3, 2e-2, 0.09], None).count, None);
         assert_eq!(at(&[0.2, 0.3], None), Separation { count: Some(0), gap: Some(2.0) });

@@ -22,7 +22,7 @@ pub(super) const LEAST_ABOVE_NOISE: f64 = 3.0;
 
 // ---- What is new, even or at rest ----
 
-/// Part of a quantity that must be independent of known ones for it to be new.
+/// Smallest independent fraction at which a quantity counts as new.
 pub(super) const NEW_PART: f64 = 1e-4;
 /// Work of a force along a field, relative to that of its components, that counts as rounding.
 pub(super) const WORKLESS: f64 = 1e-9;

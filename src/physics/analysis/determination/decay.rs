@@ -32,7 +32,7 @@ impl Decay {
     }
 }
 
-/// Decay of the motion of one coordinate; `None` if there are several, or too few states.
+/// Decay of the motion of a single coordinate; `None` for several coordinates or too few states.
 pub fn decay(periodic: &[bool], observed: &Observed) -> Option<Decay> {
     let [angle] = *periodic else { return None };
     let functions = Functions::new(&[angle], &ranges(1, &observed.q), DECAY_DEGREE);

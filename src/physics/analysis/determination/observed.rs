@@ -39,7 +39,7 @@ impl Observed {
         Ok(Self { finer: finer.unwrap_or_default(), ..Self::of(&data, measured, targets) })
     }
 
-    /// The states held out to judge the model; `None` if there are none.
+    /// The held-out states that test the model; `None` if none are held out.
     ///
     /// # Errors
     /// Those of [`RecordingSplit::datasets`].
