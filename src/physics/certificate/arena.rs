@@ -44,7 +44,7 @@ struct Pack {
 /// Range of the coefficients of a pack.
 #[derive(Clone, Copy)]
 struct Layout {
-    /// The first one.
+    /// Index of the first coefficient.
     start: usize,
     /// Places side by side: one for a single number, [`LANES`] otherwise.
     width: usize,

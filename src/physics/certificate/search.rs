@@ -201,7 +201,7 @@ fn active_axes(source: &dyn Enclose, regions: &[(Vec<(f64, f64)>, f64)]) -> Vec<
     active
 }
 
-/// Chooses the axes along which to cut a box, and the number of cuts.
+/// Decides where and how often to cut a box.
 struct Cut<'a> {
     /// For every axis, how much the matrix changes along it in the part that is cut next.
     influence: Vec<f64>,

@@ -46,7 +46,7 @@ fn found(recording: &Recording) -> FoundConstraints {
     find_constraints(&samples, ConstraintSearch::default()).unwrap()
 }
 
-/// The joints of two rods of lengths 1 and 0.8 that turn at constant rates.
+/// Two rods of lengths 1 and 0.8: one turns at a constant rate, the other accelerates.
 fn two_rods(rng: &mut ChaCha8Rng) -> Path {
     let [a, b, da, db]: [f64; 4] = [0; 4].map(|_| 3.0 * rng.random::<f64>() - 1.5);
     Box::new(move |t| {

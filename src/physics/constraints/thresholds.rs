@@ -43,7 +43,7 @@ pub(super) const MOST_CURL: f64 = 0.03;
 pub(super) const COMMON_DIRECTIONS: f64 = 0.99;
 /// Largest deviation of a ratio of gradients from a whole number.
 pub(super) const WHOLE_NUMBER_ERROR: f64 = 0.05;
-/// Largest integer multiple of an angle that is tried.
+/// Integer multiples of an angle that are tried.
 pub(super) const ANGLE_MULTIPLES: std::ops::RangeInclusive<u32> = 1..=12;
 /// Smallest square of a gradient, over its mean square, at which its direction is more than noise.
 pub(super) const VISIBLE_GRADIENT: f64 = 1e-2;

@@ -98,7 +98,7 @@ pub enum FormulaError {
         formulas.iter().map(|formula| format!("{formula} = 0")).collect::<Vec<_>>().join(" and ")
     )]
     Constrained {
-        /// The formula that vanishes.
+        /// Formulas that vanish along the motion.
         formulas: Vec<String>,
     },
     /// Every choice of terms has a singular mass matrix.

@@ -164,10 +164,10 @@ pub enum GeometryError {
     TooMany {
         /// Coordinates of the model.
         found: usize,
-        /// Allowed numbers of coordinates.
+        /// Largest number of coordinates.
         most: usize,
     },
-    /// The model refused.
+    /// The model returned an error.
     Mechanics(MechanicsError),
 }
 

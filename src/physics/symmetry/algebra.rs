@@ -111,7 +111,7 @@ struct FieldsAt {
     slopes: Vec<Vec<f64>>,
 }
 
-/// Number of states, spread over the sample, at which fields are compared.
+/// Evaluates fields at about `states` states, spread over the sample.
 fn vectors(sample: &Sample, basis: &Basis, fields: &[Field], states: usize) -> Vec<FieldsAt> {
     let (n, spread) = (sample.n, sample.spread());
     let step = (sample.len() / states).max(1);

@@ -321,7 +321,7 @@ impl Basis {
     /// Functions up to these degrees, unless they are too many, or the usual ones of the charts, with their degrees.
     ///
     /// # Errors
-    /// Description of the expected input.
+    /// Returns a description of the expected degrees.
     pub fn within(names: &[String], charts: &[Chart], degrees: Option<Degrees>) -> Result<(Self, Degrees), String> {
         let Some(degrees) = degrees else { return Ok(Self::usual(names, charts)) };
         let unknowns = unknowns(charts.len(), Self::count(charts, degrees));

@@ -68,7 +68,7 @@ mod without_std {
         pub const fn new() -> Self {
             Self(spin::Once::new())
         }
-        /// The value, made by `make` if there is none.
+        /// Returns the value, which `make` creates on first use.
         pub fn get_or_init(&self, make: impl FnOnce() -> T) -> &T {
             self.0.call_once(make)
         }

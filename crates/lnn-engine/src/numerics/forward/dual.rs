@@ -10,7 +10,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 pub struct Dual<T> {
     /// The number.
     pub value: T,
-    /// Its derivative along the direction.
+    /// Derivative along the direction.
     pub tangent: T,
 }
 

@@ -50,7 +50,7 @@ impl<S: Scalar> Buffer<S> {
 pub(super) struct Retry<S> {
     /// A block of matrices.
     pub block: Buffer<S>,
-    /// Their solutions.
+    /// Solutions of the systems.
     pub solution: Buffer<S>,
     /// One matrix.
     pub dense: Dense<S>,

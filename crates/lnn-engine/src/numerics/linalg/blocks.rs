@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn equal_eigenvalues_of_different_blocks_keep_their_own_vectors() {
-        // Two blocks with the eigenvalues 1 and 3 each, and a diagonal with 3, 1, -2 and many of 4.
+        // Two blocks, each with eigenvalues 1 and 3, and a diagonal with 3, 1, -2 and repeated 4.
         let n = 18;
         let mut matrix = vec![<Dd as Real>::zero(); n * n];
         let mut set =

@@ -116,7 +116,7 @@ impl<S: Scalar> SmallBatch<'_, S> {
 impl<S: Scalar> WithSimd for SmallBatch<'_, S> {
     type Output = ();
 
-    // As many columns at a time as keep about eight sums in registers.
+    // Chooses the number of columns so that about eight sums stay in registers.
     #[inline(always)]
     fn with_simd<V: Simd>(mut self, simd: V) {
         let rows = self.shape.0;

@@ -203,7 +203,7 @@ mod tests {
                 }
             }
             assert!(found.values[0] < rounding * largest && found.values[n - 1] > 1.0);
-            // Where values are separate, vectors agree up to the sign.
+            // Vectors of distinct singular values agree up to the sign.
             assert!(dot(&found.vectors[n - 1], &faer.vectors[n - 1]).abs() > 1.0 - rounding);
         }
         assert_eq!(by_rotations(2, 2, &[0.0; 4]).unwrap().values, [0.0; 2]);

@@ -22,7 +22,7 @@ pub(super) const ALONE_SIZE: usize = 47;
 /// From this size on faer's blocked elimination of one right-hand side is faster than that on lanes, whose blocks then no longer fit into the
 /// nearest cache.
 pub(super) const BLOCKED_SIZE: usize = 47;
-/// The same for as many right-hand sides as there are rows.
+/// The same limit when the number of right-hand sides equals the number of rows.
 pub(super) const BLOCKED_INVERSE_SIZE: usize = 40;
 /// Size above which faer's tridiagonal method for eigenvalues beats Jacobi's on lanes.
 pub(super) const TRIDIAGONAL_SIZE: usize = 32;

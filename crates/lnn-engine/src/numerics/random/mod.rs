@@ -68,7 +68,7 @@ impl RngStream {
         RandomGenerator(rng)
     }
 
-    /// Number of the stream; every purpose has one of its own.
+    /// Number of the stream; every purpose uses a separate stream.
     fn number(self) -> u64 {
         match self {
             Self::Weights => 0,

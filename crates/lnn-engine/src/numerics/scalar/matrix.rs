@@ -52,7 +52,7 @@ impl<'a, S> MatRef<'a, S> {
     /// The rows `from..to` of this view.
     ///
     /// # Panics
-    /// If there are fewer.
+    /// Panics if the range exceeds the rows of the matrix.
     #[must_use]
     pub fn row_range(self, from: usize, to: usize) -> Self {
         assert!(from <= to && to <= self.rows(), "rows past the end of a matrix view");

@@ -51,7 +51,7 @@ impl<S: Scalar> Extend<S> for Sum<S> {
 pub trait Dots: Copy {
     /// Dot products of every row `a` with every row `b`, all of one length: those of `b[o]` in element `o`.
     ///
-    /// Sums run in as many parts as a vector has lanes, which has smaller errors than one running sum.
+    /// Computes one partial sum per vector lane, which has smaller errors than a single running sum.
     fn dots<V: Simd, const R: usize, const O: usize>(simd: V, a: [&[Self]; R], b: [&[Self]; O]) -> [[Self; R]; O];
 }
 

@@ -42,7 +42,7 @@ impl<T: Real> Node<T> {
 /// A tape over numbers `T`. Life: recording (operations on [`Var`]s), reversal ([`Tape::reverse`], any number of
 /// times), reset ([`Tape::reset`], which keeps the memory).
 ///
-/// Identifier 0 stands for constants, which are never recorded.
+/// Identifier 0 denotes constants, which are never recorded.
 pub struct Tape<T> {
     /// Nodes `0..room`, written through shared references: recording is a comparison and four stores.
     room: Vec<Node<T>>,
@@ -183,7 +183,7 @@ impl<T: Real> Tape<T> {
     /// The first error since the last reset.
     ///
     /// # Errors
-    /// That error.
+    /// Returns that error.
     pub fn check(&self) -> Result<(), TapeError> {
         self.error.get().map_or(Ok(()), Err)
     }

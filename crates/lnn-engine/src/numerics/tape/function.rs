@@ -70,7 +70,7 @@ impl<S: Scalar> Function<S> {
     /// Records `f(x, parameters)` of `n` numbers and parameters, which are the same for all points of a batch and have these values.
     ///
     /// # Errors
-    /// Those of [`Function::record`].
+    /// The errors of [`Function::record`].
     pub fn with_parameters<F>(n: usize, parameters: Vec<S>, f: F) -> Result<Self, TapeError>
     where
         F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Tracer<'t, S>,
@@ -257,7 +257,7 @@ impl<S: Scalar> Function<S> {
     }
 }
 
-/// Every variable along a direction of its own.
+/// Seeds every variable with a separate direction.
 fn every_direction<R: Real>(n: usize) -> Directions<R> {
     Directions {
         seeds: (0..n as u32).map(|i| vec![(i, R::one())]).collect(),

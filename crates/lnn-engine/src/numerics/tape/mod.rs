@@ -178,7 +178,7 @@ pub fn derivative<T: Real>(f: &impl ScalarFunction, x: &[T], direction: &[T]) ->
 /// Forward mode (`n` passes) where `n <= m`, reverse mode (one recording, `m` sweeps) otherwise.
 ///
 /// # Errors
-/// Those of the tape: see [`TapeError`].
+/// The errors of the tape: see [`TapeError`].
 pub fn jacobian<T: Real>(f: &impl VectorFunction, x: &[T]) -> Result<(Vec<T>, Vec<T>), TapeError> {
     let (n, m) = (x.len(), f.outputs());
     let mut matrix = vec![T::zero(); m * n];

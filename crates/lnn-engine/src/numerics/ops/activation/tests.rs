@@ -124,7 +124,7 @@ fn identities<S: Scalar>() {
     let two = <S as Real>::two();
     for x in cloud::<S>().into_iter().chain([1e-30, 7.5, 1e20].map(S::of_f64)) {
         for activation in [Activation::Gelu, Activation::Softplus, Activation::Silu] {
-            // The two values are rounded themselves: softplus is ln 2 where x is 0.
+            // Both values are rounded: softplus is ln 2 at x = 0.
             let size = Real::abs(x) + activation.derivatives(-Real::abs(x))[0];
             let tolerance = two * S::epsilon() * Real::abs(size);
             let difference = activation.derivatives(x)[0] - activation.derivatives(-x)[0];
@@ -161,7 +161,7 @@ fn limits_at_infinity() {
         for activation in Activation::ALL {
             let jet = activation.derivatives(S::nan());
             assert!(jet[0].is_nan());
-            // The slope of a straight line is known without its argument.
+            // The slope of a straight line does not depend on its argument.
             assert_eq!(jet[1].is_nan(), activation != Activation::Identity);
         }
     }

@@ -162,7 +162,7 @@ fn reads_exactly() {
     for wrong in ["", " 1", "1 ", "1,0", "0x1", "1e", ".", "--1", "1e5.0"] {
         assert_eq!(Dd::parse(wrong), None, "{wrong}");
     }
-    // Digits beyond the kept ones still decide.
+    // Digits beyond those kept still affect the rounding.
     let long = format!("1{}1e-3000", "0".repeat(3000));
     assert_eq!(Dd::parse(&long), Some(Dd::of_f64(10.0)));
     let zeros = format!("0.{}1e5001", "0".repeat(5000));

@@ -33,7 +33,7 @@ impl<S: Copy + core::ops::Mul<Output = S>> Exponential<S> {
     }
 }
 
-/// Functions of a scalar over many numbers.
+/// Functions of a scalar, applied to slices.
 ///
 /// The `lane_*` functions have no branch and no call: a loop over them inside [`crate::scalar::vectorized`] becomes
 /// vector instructions for `f32` and `f64`. Outside of it they are right but slow (a fused multiply-add without
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
     use crate::scalar::Dd;
 
-    /// Arguments over all scales, both signs, with the special values.
+    /// Test arguments of all magnitudes and both signs, including special values.
     fn arguments<S: Scalar>() -> Vec<S> {
         let mut x = 0.37_f64;
         let mut list: Vec<S> = (0..20_003)

@@ -140,7 +140,7 @@ struct Compiler<'g, S> {
     functions: usize,
     /// Value and unit of each row.
     place: Vec<Option<(usize, usize)>>,
-    /// Single numbers taken out of values of several units.
+    /// Single components extracted from values with several units.
     taken: Map<(usize, usize), usize>,
     needed: Vec<bool>,
 }
@@ -350,7 +350,7 @@ impl<'g, S: Scalar> Compiler<'g, S> {
         self.push(Operation::Combination(Combination::new((a, factor), b)), 1, kind)
     }
 
-    /// The value that contains these rows in this order, created if there is none.
+    /// Returns the value that contains these rows in this order, and creates it if necessary.
     fn vector(&mut self, rows: &[u32]) -> usize {
         let places: Vec<(usize, usize)> = rows.iter().filter_map(|&row| self.place[row as usize]).collect();
         let (value, _) = places[0];

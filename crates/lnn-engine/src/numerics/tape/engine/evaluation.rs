@@ -94,7 +94,7 @@ impl<S: Scalar> Evaluation<S> {
     /// Fills the public fields up to `depth`; fields beyond are empty.
     ///
     /// # Panics
-    /// If there are more states than [`STATES`] or too few parameters.
+    /// Panics if there are more than [`STATES`] states or too few parameters.
     pub fn evaluate(&mut self, parameters: &[S], q: &[S], v: &[S], depth: Depth) {
         let recorded = Arc::clone(&self.recorded);
         let n = recorded.coordinates();

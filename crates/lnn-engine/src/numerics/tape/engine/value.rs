@@ -31,7 +31,7 @@ pub(super) struct Value {
     pub is_output: bool,
     /// It depends on parameters.
     pub trainable: bool,
-    /// Its only reader overwrites its adjoints; those of other values start from zero.
+    /// `true` if the only reader overwrites the adjoints, so that they need not be set to zero.
     pub in_place: bool,
 }
 

@@ -73,7 +73,7 @@ impl<S: Scalar> Program<S> {
     /// As [`Program::record`], with at most `limit` rows; `None` for a function that gave up.
     ///
     /// # Errors
-    /// Those of [`Program::record`]; [`TapeError::Full`].
+    /// The errors of [`Program::record`], and [`TapeError::Full`].
     pub fn record_within<F>(limit: u32, (inputs, parameters): (usize, usize), f: F) -> Result<Self, TapeError>
     where
         F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Option<Vec<Tracer<'t, S>>>,
@@ -184,7 +184,7 @@ impl Listing {
     /// Records `f(inputs, parameters)`.
     ///
     /// # Errors
-    /// Those of [`Program::record`](Program::record).
+    /// The errors of [`Program::record`](Program::record).
     pub fn record<S: Scalar, F>(inputs: usize, parameters: usize, f: F) -> Result<Self, TapeError>
     where
         F: for<'t> FnOnce(&[Tracer<'t, S>], &[Tracer<'t, S>]) -> Tracer<'t, S>,

@@ -19,7 +19,7 @@ const CHUNK: usize = 1 << 19;
 /// Fields up to this width are written column by column.
 const NARROW: usize = 16;
 
-/// From this many functions of a single state on, vectors are worth a call.
+/// Number of functions of a single state from which vectorized calls are faster.
 const TOGETHER: usize = 4;
 
 /// Buffers for replaying a [`Program`]: the rows of one chunk of lanes, so that repeated replays allocate nothing. A clone starts
@@ -161,7 +161,7 @@ struct Batch<'a, S> {
     parameters: &'a [S],
 }
 
-/// Some of them: lanes past the end repeat the last state.
+/// Reads some of the states; lanes past the end repeat the last state.
 struct Chunk<'a, S> {
     batch: &'a Batch<'a, S>,
     start: usize,

@@ -7,7 +7,7 @@ use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// A run of at least this many operations contains none that reads another one of it.
+/// In runs of at least this many operations, no operation reads a result of the same run.
 const UNCHAINED: usize = 6;
 
 /// The kind of an operation, without its operands.

@@ -67,7 +67,7 @@ impl<S: Scalar> Program<S> {
 /// The tangents of an adjoint: long lists with factors, each by its number, and the sum of short ones.
 #[derive(Clone)]
 struct Curve<R> {
-    /// A factor of 1 is left out.
+    /// A factor of 1 is `None`.
     long: Vec<(usize, Option<R>)>,
     short: Sparse<R>,
 }

@@ -18,7 +18,7 @@ const ROWS: usize = u8::MAX as usize;
 /// state, by the handle/"` a chain of two pendula is faster without runs, and one of four is not, though it takes fewer instructions.
 const OPERATIONS: usize = 80;
 
-/// What an operation does.
+/// Kind of an operation.
 #[derive(Clone, Copy, Debug)]
 enum Code {
     Add,
@@ -103,7 +103,7 @@ impl<S: Scalar> Single<S> {
 }
 
 impl Code {
-    /// What an operation on rows does.
+    /// Returns the code of an operation on rows.
     fn of(kind: Kind) -> Self {
         match kind {
             Kind::Binary(Binary::Add) => Self::Add,
@@ -119,10 +119,10 @@ impl Code {
     }
 }
 
-/// Products that one sum or difference alone reads, which computes them.
+/// Products with a single reader, a sum or difference, that computes them itself.
 struct Fusion {
     uniform_rows: usize,
-    /// How many operations and outputs read each row.
+    /// Number of operations and outputs that read each row.
     readers: Vec<usize>,
     /// Factors of each row that is a product with one reader.
     products: Vec<Option<[u8; 2]>>,

@@ -186,7 +186,7 @@ impl Elementwise {
                         b0[u] = curved * xst[u] + d3[u] * outer[u] * (xs[u] * xt[u]);
                     }
                 }
-                // With one direction or none, products with the missing ones are left out.
+                // With fewer than two directions, products with missing directions are omitted.
                 (false, _) => {
                     for (u, b0) in b0.iter_mut().enumerate() {
                         let mut sum = if has(y0) { d1[u] * y0[u] } else { <S as Real>::zero() };

@@ -153,7 +153,7 @@ impl<S: Scalar> Operation<S> {
             |index: usize, out: usize, sweep: &mut Forward<'_, S>| fill(sweep.parameters[index], out, sweep);
         rule!(self, out, sweep, forward, parameter, fill);
     }
-    /// Adjoints of the operands and the share of the second derivatives.
+    /// Adjoints of the operands and the contribution to the second derivatives.
     pub fn reverse(&self, out: usize, sweep: &mut Reverse<'_, S>) {
         rule!(self, out, sweep, reverse, |_, _, _| {}, |_, _, _| {});
     }
@@ -183,7 +183,7 @@ impl<S: Scalar> MixedReverse<'_, S> {
     }
 }
 
-/// Second derivatives while they are gathered: planes of one number per state.
+/// Accumulates second derivatives in planes with one number per state.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SecondOrder<S> {
     pub n: usize,
