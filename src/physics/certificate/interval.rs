@@ -38,7 +38,7 @@ impl Interval {
     pub const fn point(x: f64) -> Self {
         if x.is_nan() { Self::ENTIRE } else { Self { low: x, high: x } }
     }
-    /// From `-radius` to `radius`.
+    /// The interval from `-radius` to `radius`.
     #[inline]
     pub fn symmetric(radius: f64) -> Self {
         Self::new(-radius, radius)
@@ -155,7 +155,7 @@ fn product(a: f64, b: f64) -> f64 {
     if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
 }
 
-/// From the smallest to the largest of four numbers.
+/// The interval from the smallest to the largest of four numbers.
 #[inline]
 fn spanned([a, b, c, d]: [f64; 4]) -> Interval {
     Interval { low: a.min(b).min(c.min(d)), high: a.max(b).max(c.max(d)) }

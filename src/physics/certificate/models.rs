@@ -21,7 +21,7 @@ use std::f64::consts::TAU;
 /// end of a turn is cut there, and witnesses are given in that turn.
 ///
 /// # Errors
-/// As [`certify`](super::certify).
+/// Returns the same errors as [`certify`](super::certify).
 pub fn certify_network<S: Scalar>(
     network: &NetworkLagrangian<S>,
     region: &Bounds,

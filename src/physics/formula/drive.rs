@@ -42,7 +42,7 @@ struct Driven {
 }
 
 impl Driven {
-    /// From effects and errors, `(windows, n)`.
+    /// Computes it from effects and errors, `(windows, n)`.
     fn new(effect: &[f64], errors: &[f64], others: &[Vec<f64>], n: usize) -> Self {
         let by = |other: &[f64]| effect.chunks_exact(n).zip(other.chunks_exact(n)).map(|(a, b)| dot(a, b)).collect();
         let others = others.iter().map(|other| by(other)).collect();

@@ -84,7 +84,7 @@ pub enum FormulaError {
         value: f64,
         /// `true` if all later values are shifted, `false` for a single one.
         jumps: bool,
-        /// By how much it is off.
+        /// Size of the deviation.
         size: f64,
         /// Range of all but one sample in fifty.
         range: f64,

@@ -33,7 +33,7 @@ pub(super) struct Taylor {
 }
 
 impl PartialEq for Function {
-    /// Formulas by their texts.
+    /// Compares formulas by their texts.
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Product(a), Self::Product(b)) => a == b,

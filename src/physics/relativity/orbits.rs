@@ -167,7 +167,7 @@ pub struct Orbit {
 /// The orbits of a hole of mass `mass`, whose metric is known down to the distance `inner`; orbits that it does not have are left out.
 ///
 /// # Errors
-/// Those of the metric.
+/// The errors of the metric.
 pub fn orbits(
     model: &dyn EulerLagrange<f64>,
     around: CentralCoordinates,

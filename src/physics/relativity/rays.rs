@@ -41,7 +41,7 @@ impl RayOutcome {
 /// A ray that has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Its end.
+    /// How the ray ended.
     pub fate: RayOutcome,
     /// Steps taken, rejected ones included.
     pub steps: usize,
@@ -285,7 +285,7 @@ impl Batch<'_> {
         });
     }
 
-    /// Its end, if a ray has ended.
+    /// How the ray ended, if it has.
     fn fate(&self, ray: &ActiveRay) -> Option<RayOutcome> {
         let (place, tangent) = (self.chart.space_of(ray.q), self.chart.space_of(ray.k));
         let (distance, speed) = (norm(place), norm(tangent));

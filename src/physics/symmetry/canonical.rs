@@ -167,7 +167,7 @@ impl<S: Scalar, M: EulerLagrange<S>> Canonical<M, S> {
     /// A model in its own form at a base state, `q0` and `v0` of length `n`.
     ///
     /// # Errors
-    /// As [`CanonicalForm::at`].
+    /// Returns the same errors as [`CanonicalForm::at`].
     pub fn at(model: M, q0: &[S], v0: &[S]) -> Result<Self, SymmetryError> {
         let form = CanonicalForm::at(&model, q0, v0)?;
         Ok(Self { model, form })

@@ -234,7 +234,7 @@ pub fn charges(
 /// must have the symmetries and no friction; the rest is due to the integrator.
 ///
 /// # Errors
-/// As [`charges`].
+/// Returns the same errors as [`charges`].
 pub fn drifts(
     (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>),
     basis: &Basis,

@@ -37,7 +37,7 @@ pub struct SymmetrySummary {
     pub invariant: Invariant,
     /// For every field, whether its charge is conserved: friction may change it.
     pub conserved: Vec<bool>,
-    /// Ascending.
+    /// Singular values in ascending order.
     pub singular_values: Vec<f64>,
     /// Degrees of the functions in the fields, in the text form of [`Degrees`].
     #[serde(serialize_with = "as_text")]
@@ -68,7 +68,7 @@ pub struct QuadraticSummary {
     pub gap: Option<f64>,
     /// The new ones.
     pub conserved: Vec<String>,
-    /// Ascending.
+    /// Singular values in ascending order.
     pub singular_values: Vec<f64>,
 }
 
@@ -238,7 +238,7 @@ pub struct ComparisonSummary {
     pub first: String,
     /// Name of `B`.
     pub second: String,
-    /// Their differences.
+    /// Differences of the two Lagrangians.
     #[serde(flatten)]
     pub comparison: Comparison,
     /// States that were examined.

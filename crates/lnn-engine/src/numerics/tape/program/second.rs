@@ -73,7 +73,7 @@ struct Curve<R> {
 }
 
 impl<R> Curve<R> {
-    /// Of nothing.
+    /// An empty sum of tangents.
     fn none() -> Self {
         Self { long: Vec::new(), short: Vec::new() }
     }
