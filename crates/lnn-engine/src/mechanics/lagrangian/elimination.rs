@@ -39,7 +39,7 @@ impl<R: Real> Eliminated<R> {
     ///
     /// Coordinates are eliminated before constraints, and within each kind the row with the least fill-in comes first. For a positive
     /// definite `M` and independent rows `A`, the pivots of the coordinates are positive and those of the constraints are negative, because
-    /// they belong to `-A M^-1 A^T`; the original diagonal elements are those of this matrix.
+    /// they belong to `-A M^-1 A^T`, whose diagonal elements count as the original ones.
     pub fn of(coordinates: usize, lower: Lists<R>, most: usize) -> Option<Self> {
         let count = lower.len();
         let own = |(i, row): (usize, &Vec<(usize, R)>)| row.last().filter(|(j, _)| *j == i).map(|(_, m)| *m);

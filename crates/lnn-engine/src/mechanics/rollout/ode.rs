@@ -1,14 +1,14 @@
 //! Adapter to `ode_solvers`, the only file that uses it.
 //!
 //! Its pitfalls and how this file handles them:
-//! - A right-hand side cannot fail: the first error of an attempt is latched and `NaN` returned. An attempted step with
-//!   a failed stage is then rejected and tried shorter; the error ends the integration only once steps underflow.
-//! - Its dense output extrapolates the last sample, panics or hangs for some intervals, and is lost for failures: only
-//!   the sparse one is used, and samples are interpolated here from the stages of each accepted step.
-//! - Backward integration is fragile: the elapsed time always runs upwards from 0 (the caller flips the sign).
-//! - Statistics are lost on errors: calls are counted here.
-//! - Underflow is not noticed in `f32`: a step that does not advance the time ends the integration.
-//! - The node of stage 12 in its order 8 table is wrong (0 for 1): the time of that stage is taken from the previous one.
+//! - A right-hand side cannot fail, so the first error of an attempt is stored and `NaN` is returned. The solver then rejects the step and
+//!   tries a shorter one; the error only ends the integration when steps become too small.
+//! - Its dense output extrapolates the last sample, panics or hangs for some intervals, and is lost on failures. Only the sparse output is
+//!   used, and samples are interpolated here from the stages of each accepted step.
+//! - Backward integration is unreliable, so the elapsed time always increases from 0 (the caller changes the sign).
+//! - Statistics are lost on errors, so calls are counted here.
+//! - Underflow is not detected in `f32`, so a step that does not advance the time ends the integration.
+//! - The node of stage 12 in its table of order 8 is wrong (0 instead of 1), so the time of that stage is derived from the previous one.
 
 use super::crossing::Dense;
 use super::dense::{Interpolant, Rhs, Step};

@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 
 /// Largest number of links.
 const MAX_LINKS: usize = 64;
-/// Default acceleration of gravity in m/s^2; next, the default speed at which dry friction reaches three quarters of its maximum.
+/// Defaults: acceleration of gravity in m/s^2, and speed at which dry friction reaches three quarters of its maximum.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 const COULOMB_SPEED: f64 = 0.01;
 /// Default bounds of coordinates that the file does not describe: positions in m, and velocities in rad/s or m/s.
