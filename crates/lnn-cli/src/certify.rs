@@ -1,4 +1,4 @@
-//! `lnn certify`: a proof of where the mass matrix has its signature.
+//! `lnn certify`: proves where the mass matrix has its signature.
 
 use crate::format::FormatArgs;
 use crate::learned::Learned;
@@ -43,18 +43,18 @@ pub struct Args {
     format: FormatArgs,
 }
 
-/// `column=low..high`.
+/// Parses `column=low..high`.
 fn side(text: &str) -> Result<(String, (f64, f64)), String> {
     let found = text.split_once('=').and_then(|(name, sides)| Some((name.trim().to_string(), range(sides, "..")?)));
     found.ok_or_else(|| "expected COLUMN=LOW..HIGH, two finite numbers in order".to_string())
 }
 
-/// A condition number.
+/// Parses a condition number.
 fn condition(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|x| *x >= 1.0).ok_or_else(|| "expected a finite number of at least 1".to_string())
 }
 
-/// `positive,negative`.
+/// Parses `positive,negative`.
 fn signature(text: &str) -> Result<Signature, String> {
     let pair = text.split_once(',').and_then(|(p, n)| Some((p.trim().parse().ok()?, n.trim().parse().ok()?)));
     let found = pair.map(|(positive, negative)| Signature { positive, negative });
@@ -109,7 +109,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The states a model was trained on; all of one turn of an angle.
+/// The states that a model was trained on; an angle covers a full turn.
 fn trained(header: &Header) -> Bounds {
     let pair = |b: &[f64; 2]| (b[0], b[1]);
     let turn = |(b, &periodic): (&[f64; 2], &bool)| if periodic { (0.0, TAU) } else { pair(b) };
@@ -127,7 +127,7 @@ impl Args {
         options
     }
 
-    /// The bounds with those of the named columns replaced.
+    /// Replaces the bounds of the named columns.
     fn region(&self, columns: &[String], usual: Bounds) -> Result<Bounds, CliError> {
         let n = columns.len() / 2;
         let mut bounds = usual;

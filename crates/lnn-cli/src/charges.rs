@@ -16,17 +16,17 @@ struct Row {
     symmetry: String,
     start: f64,
     end: f64,
-    /// End less start, the sum of the next two.
+    /// Charge at the end minus charge at the start; the sum of the next two.
     drift: f64,
-    /// Integral of what breaks the symmetry in the model.
+    /// Drift because the model breaks the symmetry, as an integral.
     by_model: f64,
-    /// The rest.
+    /// Remaining drift, caused by the integrator.
     by_integrator: f64,
-    /// Largest distance from the start.
+    /// Largest deviation from the charge at the start.
     largest: f64,
 }
 
-/// All charges; only the energy if the symmetries have no number.
+/// All charges; only the energy if the number of symmetries is unknown.
 #[derive(Debug, Serialize)]
 #[serde(transparent)]
 pub struct Charges {
@@ -34,7 +34,7 @@ pub struct Charges {
 }
 
 impl Charges {
-    /// Charges along a motion, of the point symmetries that are found in the usual basis.
+    /// Computes charges along a motion, for the point symmetries in the default basis.
     ///
     /// # Errors
     /// A usage error for a region outside the domain, a data error for terms that are not finite.
@@ -61,7 +61,7 @@ impl Charges {
         Ok(Self { rows: rows.collect() })
     }
 
-    /// For a terminal.
+    /// Text for a terminal.
     pub fn text(&self) -> String {
         let headers = ["charge of", "start", "drift", "by the model", "by the integrator", "largest"];
         let rows = self.rows.iter().map(|row| {

@@ -33,7 +33,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     output::print(&findings.to_string())
 }
 
-/// A first look at recorded motion.
+/// Takes a first look at recorded motion.
 ///
 /// # Errors
 /// A data error for motion that cannot be smoothed, an interruption.
@@ -45,7 +45,7 @@ pub fn first_look(reading: &LoadedRecording, guessed: Vec<ColumnGuess>) -> Resul
     })
 }
 
-/// The commands to run next, the first one first, each with the occasion for it.
+/// The commands to run next in order of priority, each with a condition.
 fn commands(recording: &RecordingArgs, columns: &Columns, look: &FirstLook) -> Vec<(&'static str, String)> {
     let command = |verb: &str, options: &str| format!("lnn {verb}{}{options}", recording.command(columns));
     let friction = if look.has_friction() { " --friction" } else { "" };

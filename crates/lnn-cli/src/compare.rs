@@ -1,4 +1,4 @@
-//! `lnn compare`: what two Lagrangians have in common, up to factor and gauge.
+//! `lnn compare`: compares two Lagrangians up to factor and gauge.
 
 use crate::format::FormatArgs;
 use crate::probe::{Bound, Probe, bound};
@@ -39,7 +39,7 @@ pub struct Args {
     format: FormatArgs,
 }
 
-/// Compares and prints.
+/// Compares the Lagrangians and prints the result.
 ///
 /// # Errors
 /// A usage error for Lagrangians of other coordinates or a region without states, a data error for a bad model or terms that are
@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (basis, _) = first.basis(args.basis)?;
     let unknowns = unknowns(first.model.coordinates(), basis.len());
     let points = first.points(args.points, first.enough(basis.len()), unknowns)?;
-    // States on the mass shell of a system, because a model may know nothing off it.
+    // States lie on the mass shell of a system, because a model may be untrained off it.
     let (q, v) = first.states_beside(&second, points, args.seed)?;
     let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
     let [first, second] = [&args.first, &args.second].map(Clone::clone);

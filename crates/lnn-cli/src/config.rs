@@ -13,7 +13,7 @@ pub fn read_text(path: &Path) -> Result<(String, String), CliError> {
     read_text_within(path, MAX_CONFIG_BYTES)
 }
 
-/// As [`read_text`], for a file of at most `limit` bytes.
+/// Like [`read_text`], for a file of at most `limit` bytes.
 ///
 /// # Errors
 /// Those of [`read_text`].

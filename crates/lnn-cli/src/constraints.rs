@@ -57,7 +57,7 @@ fn is_data(path: &Path) -> bool {
     path.is_file() && !ends_in(path, &["toml", "safetensors"])
 }
 
-/// The table of a file.
+/// The table of constraints in a file.
 #[derive(Serialize, Deserialize)]
 struct Table {
     #[serde(default)]
@@ -106,7 +106,7 @@ fn write_table(out: &OutputFile<'_>, found: &FoundConstraints) -> Result<(), Cli
     out.write(text.as_bytes())
 }
 
-/// Prints the constraints and degenerate directions of a system or a model.
+/// Analyses a system or a model, and prints its constraints and degenerate directions.
 fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     if args.out.is_some() {
         return Err(CliError::usage("--out needs recorded motion; a system already lists its constraints in its file"));
@@ -139,13 +139,13 @@ pub fn formulas(file: &Path) -> Result<BTreeMap<String, String>, CliError> {
     if formulas.is_empty() { Err(wrong("expected formulas in the table [constraints]")) } else { Ok(formulas) }
 }
 
-/// Lines of the constraints of a file, by name.
+/// Line numbers of the constraints of a file, by name.
 fn lines(file: &Path) -> Result<impl Fn(&str) -> usize, CliError> {
     let lines = config::lines(&config::read_text(file)?.1);
     Ok(move |name: &str| lines.get(&format!("constraints.{name}")).copied().unwrap_or(usize::MAX))
 }
 
-/// The model under the constraints of a file's table, as far as these are independent at some states.
+/// Constrains the model by a file's table, as far as the constraints are independent at some states.
 ///
 /// # Errors
 /// A usage error for a file without such a table or a mistake in a formula, constraints that contradict each other, or a model that has

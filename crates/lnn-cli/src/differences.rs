@@ -1,4 +1,4 @@
-//! Where two configurations differ.
+//! Lists the differences between two configurations.
 
 use crate::thresholds::SHOWN_NAMES;
 use toml::{Table, Value};

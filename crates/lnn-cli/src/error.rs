@@ -8,7 +8,7 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Kind of a failure, as far as a calling script cares.
+/// Kind of a failure, for calling scripts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
@@ -30,7 +30,7 @@ pub struct CliError {
 }
 
 impl CliError {
-    /// Wrong arguments or configuration.
+    /// Creates an error for wrong arguments or a wrong configuration.
     pub fn usage(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Usage, message: one_line(&message.to_string()) }
     }
@@ -42,23 +42,23 @@ impl CliError {
         let lines: Vec<String> = messages.into_iter().map(|message| one_line(&message)).collect();
         if lines.is_empty() { Ok(()) } else { Err(Self { kind: Kind::Usage, message: lines.join("\nerror: ") }) }
     }
-    /// Wrong data, or a file that cannot be read or written.
+    /// Creates an error for wrong data, or for a file that cannot be read or written.
     pub fn data(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Data, message: one_line(&message.to_string()) }
     }
-    /// Wrong data in a file or on standard input, or a file that cannot be read or written.
+    /// Creates an error for a file or standard input: wrong data, or a failure to read or write.
     pub fn file(path: &Path, problem: impl fmt::Display) -> Self {
         Self::data(format_args!("{}: {problem}", input::name(path)))
     }
-    /// A signal; the message names what was kept.
+    /// Creates an error for a signal; the message states which results were kept.
     pub fn interrupted(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Interrupted, message: one_line(&message.to_string()) }
     }
-    /// A signal during a search whose partial results are worthless.
+    /// Creates an error for a signal during a search that has no useful partial results.
     pub fn nothing_written() -> Self {
         Self::interrupted("interrupted: nothing was found and nothing was written")
     }
-    /// A write to standard output that failed.
+    /// Creates an error for a failed write to standard output.
     pub fn output(error: &io::Error) -> Self {
         if error.kind() == io::ErrorKind::BrokenPipe {
             return Self { kind: Kind::ClosedPipe, message: "standard output was closed".to_string() };
@@ -104,7 +104,7 @@ impl fmt::Display for CliError {
 
 impl std::error::Error for CliError {}
 
-/// The usage error of arguments that clap refuses: its message and its hint, without the usage.
+/// Converts an error of clap to a usage error with its message and hint, without the usage.
 pub fn argument_error(error: &clap::Error) -> CliError {
     let text = error.to_string();
     let mut parts = text.trim().split("\n\n");

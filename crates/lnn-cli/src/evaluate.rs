@@ -1,4 +1,4 @@
-//! `lnn evaluate`: a model against the system it learned.
+//! `lnn evaluate`: compares a model with the system it learned.
 
 use crate::learned::{Learned, model_file};
 use crate::number::{bounds, positive, seed, thread_count, threads, tolerance, whole};
@@ -57,7 +57,7 @@ pub struct Args {
     json: bool,
 }
 
-/// The paper's starts and time span, as far as the arguments do not replace them.
+/// The starts and time span of the paper, unless the arguments replace them.
 fn span(args: &Args, system: &SystemInstance<f64>) -> Result<TrajectoryTest, CliError> {
     let n = system.coordinates;
     let replaced = |option: &str, given: &[(f64, f64)], paper: Vec<(f64, f64)>| match given {
@@ -95,7 +95,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let mut options = EvaluationOptions::new(&system, learned.domain(), seed)?;
     (options.starts, options.span, options.rtol) = (args.starts, span(args, &system)?, args.rtol);
     options.threads = threads(args.threads);
-    // If the model's file describes a system, the model was learned under the constraints of that system.
+    // If the model's file describes a system, the constraints are already part of that system.
     options.constraints = learned.header.description.is_none().then(|| learned.header.constraints.clone());
     let stop = interrupt::flag()?;
     let evaluation = match evaluate(&system, &learned.network, options, &watch(&stop)) {

@@ -1,5 +1,4 @@
-//! Which path leads to which file, and the rule by which commands write files: never over an input, and over a file with content only with
-//! `--overwrite`.
+//! Identity of files, and the rule for writing them: never over an input, and over a file with content only with `--overwrite`.
 
 use crate::input::is_standard;
 use crate::{CliError, output};
@@ -7,7 +6,7 @@ use lnn::storage::{check_target, write_atomically, write_new};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-/// `true` if two paths lead to the same file: through links, other spellings or hard links.
+/// `true` if two paths refer to the same file, also through links or different spellings.
 pub fn same_file(a: &Path, b: &Path) -> bool {
     let (Ok(a), Ok(b)) = (fs::canonicalize(a), fs::canonicalize(b)) else { return false };
     a == b || same_node(&a, &b)
@@ -30,7 +29,7 @@ pub fn holds_something(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|data| data.is_file() && data.len() > 0)
 }
 
-/// Refuses to write to an input of the command, and to a file with content unless it may be replaced.
+/// Rejects writing to an input of the command, or to a file with content unless it may be replaced.
 ///
 /// # Errors
 /// A data error naming the file.
@@ -45,7 +44,7 @@ pub fn require_free(path: &Path, inputs: &[&Path], overwrite: bool) -> Result<()
     Ok(())
 }
 
-/// A file that a command will write when its work is done, found free and writable before; `-` is standard output.
+/// A file that a command will write at the end; it was checked in advance to be free and writable. `-` is standard output.
 #[derive(Clone, Copy, Debug)]
 pub struct OutputFile<'a> {
     path: &'a Path,
@@ -53,7 +52,7 @@ pub struct OutputFile<'a> {
 }
 
 impl<'a> OutputFile<'a> {
-    /// The file, checked by [`require_free`].
+    /// Claims a file after [`require_free`] has checked it.
     ///
     /// # Errors
     /// A data error naming the file.
@@ -65,7 +64,7 @@ impl<'a> OutputFile<'a> {
         Ok(Self { path, overwrite })
     }
 
-    /// As [`claim`](Self::claim), for a system file.
+    /// Like [`claim`](Self::claim), for a system file.
     ///
     /// # Errors
     /// A usage error for another name than `*.toml` or `-`.
@@ -76,7 +75,7 @@ impl<'a> OutputFile<'a> {
         Self::claim(path, inputs, overwrite)
     }
 
-    /// Writes it whole or not at all; a file that another program created meanwhile is kept.
+    /// Writes the file atomically; a file that another program created in the meantime is kept.
     ///
     /// # Errors
     /// A data error naming the file.
@@ -107,12 +106,12 @@ impl<'a> OutputFile<'a> {
     }
 }
 
-/// `true` if the extension of a file's name is one of these, in small letters or in capitals.
+/// `true` if a file name has one of these extensions, ignoring case.
 pub fn ends_in(path: &Path, extensions: &[&str]) -> bool {
     path.extension().is_some_and(|end| extensions.iter().any(|known| end.eq_ignore_ascii_case(known)))
 }
 
-/// A parser of file names with one of these extensions.
+/// Creates a parser of file names with one of these extensions.
 pub fn file_ending<const N: usize>(
     extensions: &'static [&'static str; N],
 ) -> impl Fn(&str) -> Result<PathBuf, String> + Clone + Send + Sync + 'static {
@@ -123,7 +122,7 @@ pub fn file_ending<const N: usize>(
     }
 }
 
-/// A file that cannot be written.
+/// Creates the error for a file that cannot be written.
 pub fn cannot_write(path: &Path, error: io::Error) -> CliError {
     CliError::file(path, format_args!("cannot write: {error}"))
 }

@@ -70,7 +70,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }))
 }
 
-/// Notes laws that would explain the motion better than a network.
+/// Points out laws that would explain the motion better than a network.
 fn advise(reading: &LoadedRecording) -> Result<(), CliError> {
     let look = first_look(reading, Vec::new())?;
     look.laws().iter().for_each(|law| output::note(law));

@@ -31,7 +31,7 @@ pub struct Args {
     pub run: RunArgs,
 }
 
-/// An argument that a configuration or a checkpoint may replace.
+/// Makes an argument optional if a configuration or a checkpoint can replace it.
 fn unless_known(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "data" => argument.required(false).required_unless_present_any(["config", "resume"]),
@@ -40,7 +40,7 @@ fn unless_known(argument: clap::Arg) -> clap::Arg {
 }
 
 impl Args {
-    /// These arguments with the columns of a guess, if neither the arguments, nor a configuration, nor a run to continue name them.
+    /// Adds guessed columns, unless the arguments, a configuration or a run to continue names them.
     ///
     /// # Errors
     /// Those of [`RecordingArgs::complete`].
@@ -50,7 +50,7 @@ impl Args {
         Ok(Self { recording, ..self.clone() })
     }
 
-    /// Files that are read.
+    /// Files that the command reads.
     pub fn inputs(&self) -> Vec<&Path> {
         self.recording.data.iter().chain(&self.run.config).map(PathBuf::as_path).collect()
     }
@@ -66,7 +66,7 @@ pub struct Plan<'a> {
     /// The configuration as far as it is known without the data.
     pub config: FitConfig,
     layers: Layers,
-    /// The fit that continues.
+    /// The fit to continue, if any.
     saved: Option<Saved>,
 }
 
@@ -92,13 +92,13 @@ impl Saved {
         }
     }
 
-    /// A fit that begins here.
+    /// Creates the description of a fit that starts in the present directory.
     fn begin(fit: FitConfig) -> Self {
         Self { directory: std::env::current_dir().unwrap_or_default(), fit, text: String::new() }
     }
 
-    /// Its files, relative to the present directory; in the directory in which it was started they are unchanged. Standard input has to be
-    /// supplied again.
+    /// Its files relative to the present directory; unchanged in the directory in which it was started. Standard input has to be supplied
+    /// again.
     fn files(&self) -> Vec<String> {
         let here = std::env::current_dir().is_ok_and(|here| here == self.directory);
         let found = |file: &String| {
@@ -113,7 +113,7 @@ impl Saved {
 }
 
 impl<'a> Plan<'a> {
-    /// Reads the file that the arguments name, if any, and looks for all mistakes. If a fit continues, the arguments must agree with it,
+    /// Reads the file that the arguments name, if any, and reports all mistakes. If a fit continues, the arguments must agree with it,
     /// except for the files.
     ///
     /// # Errors
@@ -164,7 +164,7 @@ impl<'a> Plan<'a> {
         Ok(Self { config, ..plan })
     }
 
-    /// The configuration of a fit that continues, with the files of the arguments.
+    /// The configuration of a fit to continue, with the files of the arguments.
     fn beside(&self, saved: &Saved) -> Result<FitConfig, CliError> {
         let (mut config, mistakes) = self.layers.over(&saved.fit)?;
         self.layers.check(mistakes)?;
@@ -180,7 +180,7 @@ impl<'a> Plan<'a> {
         Ok(config)
     }
 
-    /// Finishes a training of merged layers for recorded states, whose numbers and bounds the `data` alone decide.
+    /// Completes a training of merged layers for recorded states, whose numbers and bounds depend on the data alone; `data` holds them.
     fn finish(&self, training: &mut Config, data: &Data) -> Result<(), CliError> {
         let acceleration_weighting = training.data.acceleration_weighting;
         training.data = Data { acceleration_weighting, ..data.clone() };
@@ -192,7 +192,7 @@ impl<'a> Plan<'a> {
         self.args.run.finish(training)
     }
 
-    /// The text that is kept in the checkpoints of a fit.
+    /// The text that identifies a fit in its checkpoints.
     ///
     /// # Errors
     /// A configuration that TOML cannot hold.
@@ -209,12 +209,12 @@ impl<'a> Plan<'a> {
         if given.is_empty() { self.config.recording.files.iter().map(PathBuf::from).collect() } else { given.clone() }
     }
 
-    /// Choices that come before the configuration.
+    /// Settings that apply before the configuration exists.
     pub fn options(&self) -> FitOptions {
         FitOptions::from(&self.config)
     }
 
-    /// Rejects a time-like coordinate that is not among these.
+    /// Rejects a time-like coordinate that is not in the list.
     ///
     /// # Errors
     /// A usage error that names them.
@@ -247,7 +247,7 @@ impl<'a> Plan<'a> {
         self.finish(&mut training, &data)?;
         self.refuse_overruled(&training, shooting.as_ref(), targets)?;
         let recording = FitColumns { files: recording.files, ..FitColumns::from(&prepared.reading.columns) };
-        // A printed configuration always shows the keys of multiple shooting.
+        // A printed configuration always contains the keys of multiple shooting.
         let shooting = shooting.filter(|_| targets == Targets::Motion || self.args.run.print_config.is_some());
         Ok(FitConfig { formula, members, ..prepared.config(training, horizon, recording, shooting) })
     }
@@ -262,14 +262,14 @@ impl<'a> Plan<'a> {
         let decided = |key: &str| {
             let Some(key) = key.strip_prefix(TRAINING) else { return false };
             let bounds = [".position", ".velocity", ".log_uniform"];
-            // A configuration that was written counts the states of its parts, which depend on other keys.
+            // A configuration written by a fit contains the numbers of states, which depend on other keys.
             let follows = ["training", "validation", "test"].map(|part| format!("data.{part}"));
             let free = key == "data.acceleration_weighting" || follows.iter().any(|part| part == key);
             (key.starts_with("data.") && !free)
                 || (key.starts_with("phase[") && bounds.iter().any(|end| key.ends_with(end)))
                 || ["parameters", "description"].iter().any(|name| key.split('.').next() == Some(name))
         };
-        // Recorded motion is of no system that has parameters.
+        // Recorded motion has no system with parameters.
         let training = Config { parameters: Default::default(), description: None, ..training.clone() };
         let finished = FitConfig { training, shooting: shooting.cloned(), ..FitConfig::default() };
         let finished = toml::Value::try_from(&finished).map_err(CliError::data)?;
@@ -288,7 +288,7 @@ impl<'a> Plan<'a> {
         self.layers.check(mistakes)
     }
 
-    /// The layers over this training and their consequences for it.
+    /// Merges the layers over this training, with the values that they imply.
     fn over(&self, training: Config) -> Result<(FitConfig, Vec<Mistake>), CliError> {
         let mut config = FitConfig { training, shooting: Some(Shooting::default()), ..FitConfig::default() };
         if self.layers.has("training.network.known") {

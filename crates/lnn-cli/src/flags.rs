@@ -12,15 +12,15 @@ use toml::{Table, Value};
 
 /// A configuration whose keys have options.
 pub trait Flagged {
-    /// Its keys.
+    /// All keys.
     const KEYS: &'static [Key];
-    /// Options that it lacks although there are keys for them.
+    /// Keys without an option.
     const WITHOUT: &'static [&'static str];
 }
 
 impl Flagged for Config {
     const KEYS: &'static [Key] = Self::KEYS;
-    // The system is an argument, and knows its time and whether it has friction.
+    // The system is an argument; it determines its time and whether it has friction.
     const WITHOUT: &'static [&'static str] = &["name", "timelike", "friction", "joint-friction"];
 }
 
@@ -32,12 +32,12 @@ impl Flagged for FitConfig {
 /// The options of a configuration's keys.
 #[derive(Clone, Debug)]
 pub struct Flags<T> {
-    /// The values that they give.
+    /// Values given by options.
     pub entries: Vec<Entry>,
     of: PhantomData<fn() -> T>,
 }
 
-/// Name of the option for keys without an option of their own.
+/// Name of the option for keys that have no option.
 const SET: &str = "set";
 
 /// An option of a key.
@@ -77,7 +77,7 @@ impl Flag {
         if key.flag.ends_with('?') { argument.num_args(0..=1).default_missing_value(usual) } else { argument }
     }
 
-    /// The value of its text.
+    /// Converts the text of the option to a value.
     fn value(&self, text: &str) -> Value {
         let scalar = |text: &str, quoted: bool| match text.trim() {
             text if quoted => Value::from(text),
@@ -85,7 +85,7 @@ impl Flag {
                 .parse::<i64>()
                 .ok()
                 .map(Value::from)
-                // An integer beyond the range of TOML stays text.
+                // An integer beyond the range of TOML remains text.
                 .or_else(|| text.parse::<f64>().ok().filter(|_| !is_whole(text)).map(Value::from))
                 .unwrap_or_else(|| text.into()),
         };
@@ -100,7 +100,7 @@ fn is_whole(text: &str) -> bool {
     text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Any text; shells are offered the names.
+/// Accepts any text; shell completion offers the names.
 #[derive(Clone)]
 struct Names(Vec<&'static str>);
 
@@ -133,7 +133,7 @@ fn flags<T: Flagged>() -> Vec<Flag> {
     found
 }
 
-/// Key and value of `KEY=VALUE`: TOML, or a text without quotes.
+/// Parses `KEY=VALUE`; the value is TOML, or text without quotes.
 fn assignment(text: &str) -> Result<Entry, clap::Error> {
     let refused = || {
         let problem =

@@ -1,4 +1,4 @@
-//! A directory that a command fills, held by one run at a time.
+//! A directory that a command fills, locked by one run at a time.
 
 use crate::{CliError, output, results};
 use lnn::pipeline::{MODEL, Output, PipelineError};
@@ -7,7 +7,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// An output directory, created and found writable before any work starts.
+/// An output directory that was created and checked to be writable before the work starts.
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
@@ -19,12 +19,12 @@ pub struct Folder {
 pub enum Attempt {
     /// The directory, locked.
     Open(Folder),
-    /// Another run holds it; ` (process ..)`, if known.
+    /// Another run has locked it; ` (process ..)`, if known.
     Held(String),
 }
 
 impl Folder {
-    /// Creates the directory if needed, takes its lock, and removes remains of killed writers.
+    /// Creates the directory if needed, locks it, and removes temporary files of killed processes.
     ///
     /// # Errors
     /// A data error if it cannot be created or written, or if another run holds it.
@@ -37,7 +37,7 @@ impl Folder {
         }
     }
 
-    /// As [`open`](Self::open), but a directory that another run holds is not an error.
+    /// Like [`open`](Self::open), but a directory locked by another run is not an error.
     ///
     /// # Errors
     /// A data error if it cannot be created or written.
@@ -71,8 +71,8 @@ impl Folder {
 }
 
 impl Output for Folder {
-    /// Writes a file whole or not at all. Files of an earlier run are removed once the new model has replaced the old one, those of an
-    /// earlier evaluation before the new one is written.
+    /// Writes a file atomically. Files of an earlier run are removed once the new model has replaced the old one; those of an earlier
+    /// evaluation are removed before the new one is written.
     fn write(&self, name: &str, bytes: &[u8]) -> Result<(), PipelineError> {
         if name == "evaluation.json" {
             results::remove_stale_evaluation(&self.path)?;

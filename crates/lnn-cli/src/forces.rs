@@ -47,19 +47,19 @@ pub struct KnownForce {
 }
 
 impl KnownForce {
-    /// Some of the components, in order.
+    /// Selects some of the components, in order.
     pub fn components(&self, of: Range<usize>) -> Self {
         let own = self.formulas.iter().filter(|(i, _)| of.contains(i));
         let formulas = own.map(|(i, formula)| (i - of.start, formula.clone())).collect();
         Self { sampled: self.sampled.components(of), formulas }
     }
 
-    /// `true` if all are 0 at all times.
+    /// `true` if all components are always 0.
     pub fn is_zero(&self) -> bool {
         self.formulas.is_empty() && self.sampled.is_zero()
     }
 
-    /// The components at a time.
+    /// Evaluates the components at a time.
     pub fn at(&self, t: f64, force: &mut [f64]) {
         self.sampled.at(t, force);
         for (i, formula) in &self.formulas {
@@ -78,7 +78,7 @@ impl Force<f64> for KnownForce {
     }
 }
 
-/// A formula of the time and of nothing else.
+/// Parses a formula that depends on the time only.
 fn of_time(text: &str) -> Result<NamedFormula, String> {
     let formula: NamedFormula = text.parse().map_err(|error| format!("{error}"))?;
     match formula.names.iter().find(|name| *name != TIME) {
@@ -138,7 +138,7 @@ impl ForceArgs {
         Ok(Some(KnownForce { sampled: sampled?, formulas }))
     }
 
-    /// The arguments of `--force`, sorted into constants, formulas and a file.
+    /// Sorts the arguments of `--force` into constants, formulas and a file.
     fn given(&self, components: Components<'_>) -> Result<Given, CliError> {
         let mut all = Given { constants: vec![None; components.known.len()], formulas: Vec::new(), file: None };
         for given in &self.force {
@@ -168,7 +168,7 @@ impl ForceArgs {
         Ok(all)
     }
 
-    /// The columns of a file, together with constants.
+    /// Combines the columns of a file with constants.
     fn recorded(
         &self,
         path: &Path,
@@ -216,7 +216,7 @@ impl ForceArgs {
         Ok(force.between(self.between.unwrap_or_default()))
     }
 
-    /// The column of time among those of a file.
+    /// Finds the column of time in a file.
     fn time_column(&self, header: &[String]) -> Result<String, String> {
         let is_time = |name: &&String| match &self.force_time {
             Some(time) => *name == time,
@@ -229,7 +229,7 @@ impl ForceArgs {
         header.iter().find(is_time).cloned().ok_or_else(problem)
     }
 
-    /// Factors that bring columns to SI units.
+    /// Factors that convert columns to SI units.
     fn factors(&self, columns: &[String]) -> Result<Vec<f64>, CliError> {
         for (name, _) in &self.force_units {
             index_of("--force-units", "column", name, columns)?;
@@ -242,11 +242,11 @@ impl ForceArgs {
     }
 }
 
-/// The arguments of `--force`.
+/// The parsed arguments of `--force`.
 struct Given {
-    /// By component; 0 where there is a formula.
+    /// Constants by component; 0 where there is a formula.
     constants: Vec<Option<f64>>,
-    /// By component.
+    /// Formulas with the index of their component.
     formulas: Vec<(usize, NamedFormula)>,
     file: Option<PathBuf>,
 }
@@ -259,14 +259,14 @@ struct Components<'a> {
 }
 
 impl Components<'_> {
-    /// The component of a name: its own or `COORDINATE_force`.
+    /// Index of a component, given its own name or `COORDINATE_force`.
     fn index(self, name: &str) -> Result<usize, CliError> {
         let usual = self.coordinates.iter().position(|own| usual_force(own) == name);
         let own = self.known.iter().position(|known| known == name);
         own.into_iter().chain(usual).min().map_or_else(|| index_of("--force", "force", name, self.known), Ok)
     }
 
-    /// For every component, the index of its column, if a file has one; the columns are added to those that are read.
+    /// For every component, the index of its column if the file has one; adds those columns to the list of columns to read.
     fn places(self, header: &[String], columns: &mut Vec<String>) -> Vec<Option<usize>> {
         let place = |(i, name): (usize, &String)| {
             let usual = self.coordinates.get(i).map(|coordinate| usual_force(coordinate));
@@ -277,18 +277,18 @@ impl Components<'_> {
         self.known.iter().enumerate().map(place).collect()
     }
 
-    /// Components that are inputs.
+    /// Range of the components that are inputs.
     fn inputs(self) -> Range<usize> {
         self.coordinates.len()..self.known.len()
     }
 
-    /// Refuses inputs without values.
+    /// Rejects inputs without values.
     fn require_inputs(self, is_known: impl Fn(usize) -> bool) -> Result<(), CliError> {
         self.inputs().find(|&i| !is_known(i)).map_or(Ok(()), |i| Err(missing(&self.known[i])))
     }
 }
 
-/// Refuses recorded forces that do not cover a motion.
+/// Rejects recorded forces that do not cover the whole motion.
 fn require_span(force: &SampledForce<f64>, (from, to): (f64, f64)) -> Result<(), String> {
     let ((first, last), slack) = (force.span(), ROUNDING_OF_TIMES * (to - from).abs());
     if from.min(to) >= first - slack && from.max(to) <= last + slack {

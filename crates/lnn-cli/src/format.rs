@@ -1,4 +1,4 @@
-//! Results of states, one after the other, as JSON or text.
+//! Prints results for states, one after another, as JSON or text.
 
 use crate::thresholds::{NUMBERS_AT_ONCE, ROWS_AT_ONCE};
 use crate::{CliError, json, output};
@@ -9,7 +9,7 @@ use lnn::scalar::Scalar;
 use serde::Serialize;
 use std::path::Path;
 
-/// Rows of a chunk for `n` coordinates, whose matrices have `n^2` numbers.
+/// Number of rows in a chunk for `n` coordinates, whose matrices have `n^2` numbers.
 pub fn chunk(n: usize) -> usize {
     (NUMBERS_AT_ONCE / (n * n).max(1)).clamp(1, ROWS_AT_ONCE)
 }
@@ -55,7 +55,7 @@ pub enum Format {
     Csv,
 }
 
-/// The first row that failed, and the number of others.
+/// Reports the first row that failed, and the number of others.
 ///
 /// # Errors
 /// A data error if any row failed.
@@ -68,7 +68,7 @@ pub fn report_failures(file: &Path, failures: &[(usize, String)]) -> Result<(), 
     Err(CliError::file(file, format_args!("row {row}: {problem}{more}")))
 }
 
-/// The reason without the batch row, which means nothing to a reader of the file.
+/// Explains an error without the row in the batch, which means nothing to a user.
 pub fn explain(error: MechanicsError) -> String {
     match error {
         MechanicsError::Singular { condition, .. } => {
@@ -80,7 +80,7 @@ pub fn explain(error: MechanicsError) -> String {
     }
 }
 
-/// A named result: its numbers and the length of a row if it is a matrix.
+/// A named result: its numbers, and the row length if it is a matrix.
 pub struct Field<'a, S> {
     pub name: &'static str,
     pub values: &'a [S],

@@ -210,7 +210,7 @@ fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
     formula_of_model(probe.model.as_ref(), chart, (&q, &v), &options).map_err(refused)
 }
 
-/// [`refused`], with the row of the file.
+/// Like [`refused`], with the row in the file.
 fn in_file(error: FormulaError, reading: &LoadedRecording) -> CliError {
     match &error {
         FormulaError::Wild { track, sample, .. } => {
@@ -220,7 +220,7 @@ fn in_file(error: FormulaError, reading: &LoadedRecording) -> CliError {
     }
 }
 
-/// A usage error for the user's choices, a data error for the data.
+/// Distinguishes usage errors, caused by options, from data errors.
 fn refused(error: FormulaError) -> CliError {
     match &error {
         FormulaError::Terms { .. } => CliError::usage(format_args!("--basis: {error}")),

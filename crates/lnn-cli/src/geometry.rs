@@ -140,7 +140,7 @@ fn print_points<S: Scalar>(
     report_failures(file, &failures)
 }
 
-/// A point in words.
+/// Describes a point in words.
 fn heading<S: Scalar>(names: &[String], q: &[S]) -> String {
     let parts = names.iter().zip(q).map(|(name, x)| format!("{name} = {}", trimmed(x.to_f64(), 7)));
     parts.collect::<Vec<_>>().join(", ")
@@ -154,7 +154,7 @@ fn written<S: Scalar>(format: Format, report: &PointReport<S>, heading: &str) ->
     }
 }
 
-/// Notes if the metric depends on the velocity.
+/// Prints a note if the metric depends on the velocity.
 fn note_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) {
     if depends_on_velocity(model, q, v) {
         output::note("the mass matrix depends on the velocity; it is taken at --velocity, by default at rest");

@@ -1,4 +1,4 @@
-//! `lnn identify`: the constants of a known Lagrangian from recorded motion.
+//! `lnn identify`: determines the constants of a known Lagrangian from recorded motion.
 
 use crate::files::OutputFile;
 use crate::number::{choice, one_of, positive, seconds, thread_count, threads};
@@ -74,11 +74,11 @@ pub struct Args {
     page: PageArgs,
 }
 
-/// What the constants are fitted to.
+/// Quantities to which constants can be fitted.
 const TARGETS: [(&str, Targets, &str); 2] =
     [("motion", Targets::Motion, "The motion"), ("forces", Targets::Forces, "Known forces")];
 
-/// The columns default to the coordinates of the system.
+/// Makes the columns optional, because they default to the coordinates of the system.
 fn default_to_the_system(argument: clap::Arg) -> clap::Arg {
     match argument.get_id().as_str() {
         "coords" => argument.help("Columns of the coordinates, in the order of the system [default: its names]"),
@@ -132,7 +132,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     OutputFile::print(out, &output::shown(&found, args.json, Identified::findings)?)
 }
 
-/// The recording; its columns have the names of the system unless others are given.
+/// Reads the recording; its columns are named like the coordinates unless options name others.
 fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
     if !instance.readings().is_empty() {
         return read_measured(args, instance);
@@ -159,7 +159,7 @@ fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, 
     read_files(&recording.data, &columns)
 }
 
-/// The recording of the quantities that the system file declares as measured; its columns have their names.
+/// Reads the recording of the quantities that the system file declares as measured; the columns have their names.
 fn read_measured(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
     let mut recording = args.recording.clone();
     let given = [
@@ -186,7 +186,7 @@ fn read_measured(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRe
     Ok(reading)
 }
 
-/// A usage error for the user's choices, a data error for the data.
+/// Distinguishes usage errors, caused by options, from data errors.
 fn refused(error: IdentifyError) -> CliError {
     match &error {
         IdentifyError::Constant { .. } | IdentifyError::Repeated { what: "constants", .. } => {
@@ -195,7 +195,7 @@ fn refused(error: IdentifyError) -> CliError {
         IdentifyError::Sensor { what, .. }
         | IdentifyError::SensorsBesideReadings { what }
         | IdentifyError::Repeated { what, .. } => {
-            // Options are in the singular.
+            // The messages use plural names, but options are singular.
             let text = error.to_string();
             CliError::usage(format_args!("--{}{}", what.trim_end_matches('s'), &text[what.len()..]))
         }
@@ -213,7 +213,7 @@ fn refused(error: IdentifyError) -> CliError {
     }
 }
 
-/// `true` if the result is written into a robot's file.
+/// `true` if the result goes into a robot file.
 fn is_robot_written(args: &Args) -> bool {
     args.out.as_deref().is_some_and(is_robot)
 }
@@ -222,7 +222,7 @@ fn is_robot_written(args: &Args) -> bool {
 fn claim<'a>(args: &Args, out: &'a Path, inputs: &[&Path]) -> Result<OutputFile<'a>, CliError> {
     match is_robot_written(args) && is_robot(Path::new(&args.system)) {
         true => {
-            // Reports what cannot be written before the search.
+            // Detects before the search what cannot be written after it.
             system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &[]))?;
             OutputFile::claim(out, inputs, args.page.overwrite)
         }
@@ -230,7 +230,7 @@ fn claim<'a>(args: &Args, out: &'a Path, inputs: &[&Path]) -> Result<OutputFile<
     }
 }
 
-/// Writes the description, or the robot's file, with the values that were found.
+/// Writes the description, or the robot file, with the identified values.
 fn write(
     args: &Args,
     out: &OutputFile<'_>,

@@ -1,4 +1,4 @@
-//! Files that a command reads, `-` being standard input.
+//! Files that a command reads; `-` is standard input.
 
 use crate::CliError;
 use lnn::storage::{ReadError, read_regular};
@@ -10,7 +10,7 @@ pub fn is_standard(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// A file's name in messages.
+/// Name of a file in messages.
 pub fn name(path: &Path) -> String {
     if is_standard(path) { "standard input".to_string() } else { path.display().to_string() }
 }
@@ -24,7 +24,7 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, CliError> {
     bytes.map_err(|error| CliError::file(path, error))
 }
 
-/// Reads to the end, of at most `limit` bytes.
+/// Reads an input to its end, but at most `limit` bytes.
 fn bounded(input: impl Read, limit: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
     let read = input.take(limit.saturating_add(1)).read_to_end(&mut bytes)? as u64;

@@ -1,4 +1,4 @@
-//! `lnn inspect`: the Euler-Lagrange terms of states, full digits.
+//! `lnn inspect`: prints the Euler-Lagrange terms of states with all digits.
 
 use crate::constraints::constrained;
 use crate::format::{Field, Format, Shape, chunk, explain, report_failures, show};
@@ -137,7 +137,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     report_failures(file, &failures)
 }
 
-/// Prints the pattern of the second derivatives.
+/// Prints which second derivatives are zero, constant or state-dependent.
 fn structure<S: Scalar>(args: &Args, source: &Source<S>) -> Result<(), CliError> {
     let pattern = source.model.pattern();
     let pattern = pattern.ok_or_else(|| CliError::data("--structure: the Lagrangian is too large to be recorded"))?;
@@ -151,7 +151,8 @@ fn structure<S: Scalar>(args: &Args, source: &Source<S>) -> Result<(), CliError>
 /// A model with its Lagrangian.
 type Model<S> = Box<dyn EulerLagrange<S>>;
 
-/// The model under the constraints, in the form and with the accelerations that the arguments request, and the factor of its canonical form.
+/// Creates the model under the constraints, in the requested form and with the requested accelerations; also returns the factor of its
+/// canonical form.
 fn requested<S: Scalar>(
     args: &Args,
     model: Model<S>,
@@ -173,7 +174,7 @@ fn requested<S: Scalar>(
     Ok((if args.least_norm { Box::new(LeastNorm(model)) } else { model }, factor))
 }
 
-/// The model in its canonical form at the base state in `text`, or at the first of the states `(q, v)` if that is empty.
+/// Creates the canonical form of the model at the base state in `text` or, if that is empty, at the first of the states `(q, v)`.
 fn canonical<S: Scalar>(
     model: Model<S>,
     text: &str,
@@ -198,12 +199,12 @@ fn canonical<S: Scalar>(
 /// Eigenvalues of a batch of mass matrices, ascending; `NaN` for a matrix that is not finite.
 fn spectrum<S: Scalar>(n: usize, matrices: &[S]) -> Vec<S> {
     let mut values = vec![S::nan(); matrices.len() / n];
-    // The matrix that fails has NaN eigenvalues already; the state itself is reported by its terms.
+    // A matrix that fails already has NaN eigenvalues, and its state is reported with its terms.
     let _ = eigenvalues(n, matrices, &mut values, &mut Workspace::new());
     values
 }
 
-/// `g(v, v)` of a batch of states of geodesics of a metric with a time, whose `L` is the energy, `g(v, v)/2`; nothing of another model.
+/// `g(v, v)` of a batch of states, for geodesics of a metric with a time, whose `L` is the energy, `g(v, v)/2`; empty for other models.
 fn squares<S: Scalar>((n, v): (usize, &[S]), terms: &Terms<S>, spectrum: &[S]) -> Vec<S> {
     let zero = <S as Real>::zero();
     let rounding = S::of_f64(ROUNDINGS_OF_ZERO) * S::epsilon();
@@ -212,7 +213,7 @@ fn squares<S: Scalar>((n, v): (usize, &[S]), terms: &Terms<S>, spectrum: &[S]) -
         let speed = v[k * n..(k + 1) * n].iter().fold(<S as Real>::one(), |sum, &v| sum + v * v);
         let size = terms.mass_matrix[k * n * n..(k + 1) * n * n].iter().fold(zero, |sum, g| sum + g.abs()) * speed;
         let signs = (spectrum[k * n] < zero, spectrum[(k + 1) * n - 1] > zero);
-        // A state that is not finite is no evidence.
+        // States that are not finite are ignored.
         !size.is_finite() || (signs == (true, true) && (l - energy).abs() <= rounding * size)
     };
     let all = terms.force.is_empty() && values.enumerate().all(is_energy);
@@ -222,7 +223,7 @@ fn squares<S: Scalar>((n, v): (usize, &[S]), terms: &Terms<S>, spectrum: &[S]) -
 /// The constraints at a state, and the degenerate directions of its Lagrangian there.
 #[derive(Default)]
 struct ConstrainedState<S> {
-    /// `phi(q)`, and `A v - b`.
+    /// Values of `phi(q)` and `A v - b`.
     values: Vec<S>,
     rates: Vec<S>,
     /// Eigenvalues of the mass matrix within the constraints.
@@ -232,7 +233,7 @@ struct ConstrainedState<S> {
 }
 
 impl<S: Scalar> ConstrainedState<S> {
-    /// For every state of a batch.
+    /// Computes the constraints for every state of a batch.
     fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], terms: &Terms<S>) -> Vec<Self> {
         let (n, m) = (model.coordinates(), terms.constraints);
         let states = q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate();
@@ -264,12 +265,12 @@ struct Slopes<S> {
     by_q: Vec<S>,
     by_v: Vec<S>,
     by_force: Vec<S>,
-    /// `(parameters, n)`.
+    /// Derivatives with respect to the parameters, `(parameters, n)`.
     by_parameters: Vec<S>,
 }
 
 impl<S: Scalar> Slopes<S> {
-    /// For every state of a batch.
+    /// Computes the derivatives for every state of a batch.
     fn of(linearizer: &mut Linearizer<'_, S>, n: usize, (q, v): (&[S], &[S])) -> Vec<Self> {
         let states = q.chunks_exact(n).zip(v.chunks_exact(n));
         states.map(|(q, v)| Self::at(linearizer, q, v).unwrap_or_default()).collect()
@@ -304,7 +305,7 @@ impl<S: Scalar> Slopes<S> {
     }
 }
 
-/// All results for state `k` of a batch; `factor` is the factor of a canonical form.
+/// Collects all results for state `k` of a batch; `factor` is that of a canonical form.
 fn fields<'a, S>(
     n: usize,
     k: usize,

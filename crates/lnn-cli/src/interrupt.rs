@@ -1,5 +1,5 @@
-//! Ctrl-C, SIGTERM, which batch systems send, and SIGHUP of a closed terminal: work that can be kept finishes its step first, everything
-//! else ends at once.
+//! Handles Ctrl-C, SIGTERM, which batch systems send, and SIGHUP of a closed terminal: work with results to keep finishes its step first,
+//! everything else ends at once.
 
 use crate::CliError;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -8,19 +8,20 @@ use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// A closed terminal, by its number: `signal_hook` has no name for it on Windows, where it does not exist.
+/// Number of the signal for a closed terminal; `signal_hook` has no name for it on Windows, where it does not exist.
 const SIGHUP: i32 = 1;
 
-/// Signals that end the program, with the exit code of each, 128 and its number.
+/// Signals that end the program, with their exit codes: 128 plus the number of the signal.
 const SIGNALS: [(i32, u8); 3] = [(SIGINT, 130), (SIGTERM, 143), (SIGHUP, 129)];
 
-/// Exit code of the signal that came last; a signal is the process's, and so is this.
+/// Exit code of the last signal; it is global because signals belong to the process.
 static CODE: AtomicUsize = AtomicUsize::new(SIGNALS[0].1 as usize);
 
-/// While it is up, a signal ends the program at once; while it is down, a signal raises it.
+/// If the flag is raised, a signal ends the program at once; otherwise, a signal raises it.
 static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// Signals end the program at once with their exit codes, until [`flag`] catches them; files being written are then whole or absent.
+/// Lets signals end the program at once with their exit codes, until [`flag`] catches them; files being written are then complete or
+/// absent.
 ///
 /// # Errors
 /// A data error if a handler cannot be installed.
@@ -34,12 +35,12 @@ fn install() -> io::Result<()> {
     }
     let flag = FLAG.get_or_init(|| Arc::new(AtomicBool::new(true)));
     for (signal, code) in SIGNALS {
-        // Signals that are ignored from the start, as SIGHUP under nohup, stay ignored.
+        // Signals that are ignored from the start, such as SIGHUP under nohup, remain ignored.
         let status = || std::fs::read_to_string("/proc/self/status").ok();
         if signal == SIGHUP && (cfg!(windows) || !ends(signal, status().as_deref())) {
             continue;
         }
-        // In this order, the first signal finds the flag lowered.
+        // With this order of handlers, the first signal finds the flag lowered.
         register_conditional_shutdown(signal, i32::from(code), Arc::clone(flag))?;
         register_usize(signal, &CODE, usize::from(code))?;
         register(signal, Arc::clone(flag))?;
@@ -47,7 +48,7 @@ fn install() -> io::Result<()> {
     Ok(())
 }
 
-/// The flag that a signal raises from now on; a second one ends the program at once, with the exit code of that signal.
+/// Returns the flag that a signal raises from now on; a second signal ends the program at once, with its exit code.
 ///
 /// # Errors
 /// As [`watch`].
@@ -63,7 +64,7 @@ pub fn exit_code() -> u8 {
     CODE.load(Ordering::SeqCst) as u8
 }
 
-/// `true` if a signal is known not to be ignored: the mask `SigIgn` in the status of the process has a bit for each ignored one.
+/// `true` unless a signal is known to be ignored: the mask `SigIgn` in the process status has a bit for each ignored signal.
 fn ends(signal: i32, status: Option<&str>) -> bool {
     let mask = status.and_then(|status| status.lines().find_map(|line| line.strip_prefix("SigIgn:")));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());

@@ -1,4 +1,4 @@
-//! `lnn inspect --inverse`: the forces that make known accelerations.
+//! `lnn inspect --inverse`: computes the forces that cause known accelerations.
 
 use crate::format::{Field, Format, Shape, chunk, explain, report_failures, show};
 use crate::number::index_of;
@@ -72,7 +72,7 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>, drive
     report_failures(path, &failures)
 }
 
-/// The forces on state `k` of a batch.
+/// Formats the forces on state `k` of a batch.
 fn line<S: Scalar>(
     format: Format,
     row: usize,

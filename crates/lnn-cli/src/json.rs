@@ -1,9 +1,9 @@
-//! JSON numbers with every digit.
+//! JSON numbers with all digits.
 
 use lnn::scalar::Scalar;
 
-/// A number with 9 significant digits (`f32`), 17 (`f64`) or as many as its text has (double-double); `null` if it is
-/// not finite, which JSON cannot say.
+/// A number with 9 significant digits (`f32`), 17 (`f64`) or as many as its text has (double-double); `null` if it is not finite, which
+/// JSON cannot represent.
 pub fn number<S: Scalar>(x: S) -> String {
     if !x.is_finite() {
         return "null".to_string();

@@ -1,5 +1,5 @@
-//! Configurations in layers: a base, the values of a file over it, and options over both. One function merges them, and they are
-//! deserialised once; all mistakes are reported together, each with file and line or with its option.
+//! Merges configurations in layers: a base, the values of a file, and options. The result is deserialised once; all mistakes are reported
+//! together, each with file and line or with its option.
 
 use crate::CliError;
 use crate::config::{self, Lines, line_of};
@@ -23,12 +23,12 @@ pub struct Mistake {
     key: String,
     /// The problem in words.
     problem: String,
-    /// The option for a key that does not exist.
+    /// The option, if it sets a key that does not exist.
     option: Option<String>,
 }
 
 impl Mistake {
-    /// A mistake in a key.
+    /// Creates a mistake in a key.
     pub fn new(key: impl Into<String>, problem: impl fmt::Display) -> Self {
         Self { key: key.into(), problem: problem.to_string(), option: None }
     }
@@ -40,16 +40,16 @@ impl From<ConfigError> for Mistake {
     }
 }
 
-/// A value over the base.
+/// A value that replaces one of the base.
 #[derive(Clone, Debug)]
 pub struct Entry {
     path: Steps,
     value: Value,
-    /// The option that gives the value; none for the file.
+    /// The option that sets the value; `None` if the file does.
     option: Option<String>,
 }
 
-/// Names and indices from the top of a configuration.
+/// Path of names and indices from the top of a configuration.
 type Steps = Vec<Step>;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,7 +58,7 @@ enum Step {
     Index(usize),
 }
 
-/// `phase[0].rate`.
+/// Formats a path such as `phase[0].rate`.
 fn text_of(path: &[Step]) -> String {
     path.iter().fold(String::new(), |text, step| match step {
         Step::Key(name) => join(&text, name),
@@ -67,7 +67,7 @@ fn text_of(path: &[Step]) -> String {
 }
 
 impl Entry {
-    /// The value that an option gives to a key.
+    /// Creates an entry for a value that an option sets.
     pub fn option(option: impl Into<String>, key: &str, value: impl Into<Value>) -> Self {
         let part = |part: &str| {
             let mut pieces = part.split('[');
@@ -86,18 +86,18 @@ impl Entry {
         text_of(&self.path)
     }
 
-    /// The text of this option, if it gives a key.
+    /// The text of this option, if it sets the key.
     pub fn text(&self, key: &str) -> Option<&str> {
         self.value.as_str().filter(|_| self.option.is_some() && self.key() == key)
     }
 
-    /// The same option with another value.
+    /// Copies the entry with another value.
     pub fn with(self, value: impl Into<Value>) -> Self {
         Self { value: value.into(), ..self }
     }
 }
 
-/// The layers over a base.
+/// Layers of values that replace those of a base.
 #[derive(Debug)]
 pub struct Layers {
     keys: &'static [Key],
@@ -110,7 +110,7 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// The values of a file, if there is one, with options over them, for a configuration with these keys.
+    /// Reads the values of a file, if there is one, and adds options that override them, for a configuration with these keys.
     ///
     /// # Errors
     /// A data error for a file that cannot be read, a usage error for text that is not TOML.
@@ -138,13 +138,13 @@ impl Layers {
         Ok(layers)
     }
 
-    /// Splits a value into values of single keys.
+    /// Splits a value into values of single keys and adds them.
     fn add(&mut self, entry: Entry, below: Below) {
         let Entry { path, value, option } = entry;
         let at = |step: Step| path.iter().cloned().chain([step]).collect::<Steps>();
         match (value, below) {
             (Value::Table(table), Below::Keys(keys)) if !table.is_empty() => {
-                // The kind of a table decides its other keys.
+                // The kind of a table determines its other keys.
                 let (kind, others): (Vec<_>, Vec<_>) = table.into_iter().partition(|(name, _)| name == KIND);
                 for (name, value) in kind.into_iter().chain(others) {
                     let key = keys.iter().find(|key| key.name == name);
@@ -178,17 +178,17 @@ impl Layers {
         self.unknown.push(Mistake { option: entry.option.clone(), ..Mistake::new(key, problem) });
     }
 
-    /// The value of a key above the base.
+    /// The value of a key in the layers.
     pub fn get(&self, key: &str) -> Option<&Value> {
         self.entries.iter().rev().find(|entry| entry.key() == key).map(|entry| &entry.value)
     }
 
-    /// The text of a key above the base.
+    /// The text of a key in the layers.
     pub fn text(&self, key: &str) -> Option<&str> {
         self.get(key)?.as_str()
     }
 
-    /// The numbers of a table above the base.
+    /// The numbers of a table in the layers.
     pub fn numbers(&self, table: &str) -> impl Iterator<Item = (String, f64)> {
         let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
         self.entries.iter().filter_map(move |entry| match entry.path.as_slice() {
@@ -202,12 +202,12 @@ impl Layers {
         self.file.is_some()
     }
 
-    /// `true` if a key, or one below it, has a value above the base.
+    /// `true` if a layer sets a key or one below it.
     pub fn has(&self, key: &str) -> bool {
         self.lines.contains_key(key) || self.entries.iter().any(|entry| covers(key, &entry.key()))
     }
 
-    /// Ignores the file's value of a key.
+    /// Removes the file's value of a key.
     pub fn forget(&mut self, key: &str) {
         self.entries.retain(|entry| entry.option.is_some() || entry.key() != key);
         self.lines.remove(key);
@@ -223,7 +223,7 @@ impl Layers {
         self.entries.splice(at..at, implied);
     }
 
-    /// The base with the values of all layers, and the mistakes in them; a wrong value is passed over.
+    /// Merges all layers into the base; also returns the mistakes in them. Wrong values are skipped.
     ///
     /// # Errors
     /// A data error if the base itself cannot be written.
@@ -239,7 +239,7 @@ impl Layers {
             let refusal = Some((path.clone(), message.clone()));
             let mut suspects: Vec<usize> = (0..entries.len()).rev().collect();
             suspects.retain(|&k| covers(&path, &entries[k].key()) || covers(&entries[k].key(), &path));
-            // The error of a table with several kinds does not name the wrong key: it is the one whose removal changes the error.
+            // If tables have kinds, the error does not name the wrong key: it is the key whose removal changes the error.
             let without = |k: usize| {
                 let others: Vec<&Entry> =
                     entries.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, entry)| *entry).collect();
@@ -259,7 +259,7 @@ impl Layers {
         }
     }
 
-    /// The problem with a value that was refused.
+    /// Describes why a value was rejected.
     fn problem(&self, path: &str, value: &Value, message: &str) -> String {
         let key = find_key(self.keys, path);
         if let Some(name) = message.strip_prefix("missing field `").and_then(|rest| rest.split('`').next()) {
@@ -284,7 +284,7 @@ impl Layers {
         }
     }
 
-    /// Mistakes for keys that are decided elsewhere and whose values differ from the `finished` configuration: they would be ignored
+    /// Reports keys that are determined elsewhere and whose values differ from the `finished` configuration, because they would be ignored
     /// silently.
     pub fn overruled(&self, finished: &Value, decided: impl Fn(&str) -> bool, why: &str) -> Vec<Mistake> {
         let number = |value: &Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
@@ -300,7 +300,7 @@ impl Layers {
         entries.map(|entry| Mistake::new(entry.key(), why)).collect()
     }
 
-    /// All mistakes, in the order of the file, each with its line or its option.
+    /// Reports all mistakes in the order of the file, each with its line or its option.
     ///
     /// # Errors
     /// A usage error, if there are any.
@@ -319,7 +319,7 @@ impl Layers {
         CliError::all_usage(placed.into_iter().map(|(_, text)| text))
     }
 
-    /// Line and place of a key: the option that sets it, or its line in the file.
+    /// Location of a key: the option that sets it, or its line in the file.
     fn place(&self, key: &str) -> (usize, String) {
         let options = self.entries.iter().filter(|entry| entry.option.is_some());
         let around = |entry: &&Entry| covers(&entry.key(), key);
@@ -338,12 +338,12 @@ impl Layers {
     }
 }
 
-/// `true` if a path is another one or leads to it.
+/// `true` if one path equals or contains another.
 fn covers(outer: &str, inner: &str) -> bool {
     outer.is_empty() || inner.strip_prefix(outer).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
-/// The base with these values.
+/// Merges these values into the base.
 fn merged(base: &Value, entries: &[&Entry], mistakes: &mut Vec<Mistake>) -> Value {
     let mut root = base.clone();
     for entry in entries {
@@ -366,9 +366,9 @@ fn put(root: &mut Value, path: &[Step], value: &Value) -> Result<(), &'static st
     const NOWHERE: &str = "there is no such key or element";
     let Some((first, rest)) = path.split_first() else {
         match (&mut *root, value) {
-            // An empty table means that the key is present.
+            // An empty table only states that the key is present.
             (Value::Table(_), Value::Table(new)) if new.is_empty() => {}
-            // A list of tables sets the number of tables; additional ones start from the last of the base.
+            // A list of tables sets the number of tables; additional ones copy the last one of the base.
             (Value::Array(old), Value::Array(new)) if is_list_of_tables(old) && is_list_of_tables(new) => {
                 let last = old.last().cloned().unwrap_or_else(|| Table::new().into());
                 old.resize(new.len(), last);
@@ -384,7 +384,7 @@ fn put(root: &mut Value, path: &[Step], value: &Value) -> Result<(), &'static st
                 return Err("a table of kind none has no other keys");
             }
             if name == KIND && rest.is_empty() && table.get(KIND) != Some(value) {
-                // Another kind keeps the weight alone.
+                // If the kind changes, only the weight is kept.
                 table.retain(|name, _| name == "lambda" && !none(Some(value)));
             }
             let new = || Value::Table(Table::new());
@@ -395,7 +395,7 @@ fn put(root: &mut Value, path: &[Step], value: &Value) -> Result<(), &'static st
     }
 }
 
-/// Gives a penalty that needs them the default weight and the time of the network.
+/// Completes a penalty with the default weight and the time of the network, if it needs them.
 fn complete(config: &mut Value) {
     let time = config.get("network").and_then(|network| network.get("time_like")).cloned();
     let Some(penalty) = config.get_mut("penalty").and_then(Value::as_table_mut) else { return };

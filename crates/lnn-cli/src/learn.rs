@@ -1,4 +1,4 @@
-//! Common parts of `lnn train` and `lnn fit` around the training: directory, checkpoints, results on standard output, end.
+//! Common parts of `lnn train` and `lnn fit`: directory, checkpoints, results on standard output, end.
 
 use crate::folder::Folder;
 use crate::learned::model_file;
@@ -26,11 +26,11 @@ pub struct LearnedRun {
     pub json: String,
     /// Headline and tables.
     pub findings: Findings,
-    /// Reason for which learning ended.
+    /// Why learning ended.
     pub stop: StopReason,
-    /// Epochs that were run.
+    /// Number of epochs that were run.
     pub epochs: usize,
-    /// What an interruption after the training left out, in words.
+    /// Describes what an interruption after the training left out.
     pub unfinished: Option<String>,
 }
 
@@ -57,7 +57,7 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Watches for signals and keeps checkpoints, with `identity` in them instead of the configuration.
+    /// Watches for signals and keeps checkpoints, which store `identity` instead of the configuration.
     ///
     /// # Errors
     /// Signals that cannot be watched for.
@@ -90,7 +90,7 @@ impl<'a> Session<'a> {
                 let on = continuation_hint(path);
                 return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
             }
-            // There is neither a model nor anything to continue from.
+            // Without a model, there is nothing to continue from.
             Err(error) if is_empty(&error) => return Err(remove_finished(path).err().unwrap_or_else(|| error.into())),
             Err(error) => return Err(with_continuation(path)(error.into())),
         };

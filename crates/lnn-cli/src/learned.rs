@@ -30,7 +30,7 @@ pub fn model_file(path: &Path) -> Result<PathBuf, CliError> {
     Ok(pipeline::model_file(path)?)
 }
 
-/// The error of a command that does not support the constraints of a motion.
+/// Creates the error of a command that does not support constraints.
 pub fn held(name: &dyn std::fmt::Display) -> CliError {
     CliError::usage(format_args!("{name}: {}", pipeline::CONSTRAINTS_UNSUPPORTED))
 }
@@ -48,7 +48,7 @@ impl<S: Scalar> Learned<S> {
         Ok(Self { header, network })
     }
 
-    /// As [`Learned::load`], for a command that does not support constraints.
+    /// Like [`Learned::load`], for a command that does not support constraints.
     ///
     /// # Errors
     /// As [`Learned::load`]; a usage error for a model under constraints.
@@ -87,7 +87,7 @@ impl<S: Scalar> Learned<S> {
         Ok(configured)
     }
 
-    /// A system by name or by file that has the model's columns.
+    /// Finds a system by name or by file; it must have the model's columns.
     ///
     /// # Errors
     /// A usage error for an unknown system, a wrong parameter, or other columns.

@@ -85,7 +85,7 @@ use tracing_subscriber::fmt::FmtContext;
 use tracing_subscriber::fmt::format::{FormatEvent, FormatFields, Writer};
 use tracing_subscriber::registry::LookupSpan;
 
-/// The three most common tasks, with a line to copy for each.
+/// The three most common tasks, each with a command to copy.
 const EXAMPLES: &str = "\
 To learn a listed system and see in report.html how good the model is:
   lnn train double-pendulum
@@ -94,7 +94,7 @@ To look at your own recording, then to learn from it:
 To predict motion with the learned model:
   lnn rollout runs/double-pendulum --state 0.6,0.9,0,0 --t-end 10 --dt 0.05 --out motion.csv";
 
-/// Order of the parts of the help.
+/// Order of the sections of the help.
 const TEMPLATE: &str = "{about}\n\n{before-help}{usage-heading} {usage}\n\n{all-args}{after-help}";
 
 /// Learn a Lagrangian from motion, predict motion that conserves its energy, and read physics off the learned function.
@@ -156,9 +156,9 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     ended(|| run(cli.command))
 }
 
-/// Runs a program with the signals and warnings of this one: a failure is one line on standard error and an exit code.
+/// Runs a program with signal handling and warnings: a failure becomes one line on standard error and an exit code.
 pub fn ended(work: impl FnOnce() -> Result<(), CliError>) -> ExitCode {
-    // A command with results to keep requests the flag before it begins its work.
+    // A command with results to keep requests the interrupt flag before it starts working.
     let ready = watch_log().and_then(|()| interrupt::watch());
     match ready.and_then(|()| work()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -207,7 +207,7 @@ fn run(command: Command) -> Result<(), CliError> {
     }
 }
 
-/// Prints help and version where they were requested; a wrong argument is reported on one line, like any other error.
+/// Prints help or version on request; a wrong argument is reported on one line, like any other error.
 pub fn answer(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind::{DisplayHelp, DisplayHelpOnMissingArgumentOrSubcommand, DisplayVersion};
     match error.kind() {
@@ -219,7 +219,7 @@ pub fn answer(error: &clap::Error) -> ExitCode {
             _ => ExitCode::SUCCESS,
         },
         DisplayHelpOnMissingArgumentOrSubcommand => {
-            // Nothing more can be done if even this cannot be shown.
+            // If this cannot be printed either, nothing more can be done.
             let _ = write!(std::io::stderr(), "{}", wrap_text(&error.to_string(), WIDTH));
             ExitCode::from(2)
         }
@@ -236,8 +236,8 @@ fn report(error: &CliError) {
     let _ = writeln!(std::io::stderr(), "error: {error}");
 }
 
-/// Warnings of this program go to standard error as lines like its errors; the environment variable `LNN_LOG` (such as `debug`) chooses
-/// more, with times and modules.
+/// Prints warnings to standard error in the same form as errors; the environment variable `LNN_LOG` (such as `debug`) selects more, with
+/// times and modules.
 fn watch_log() -> Result<(), CliError> {
     use tracing_subscriber::Layer as _;
     use tracing_subscriber::filter::{LevelFilter, Targets};
@@ -260,7 +260,7 @@ fn watch_log() -> Result<(), CliError> {
     Ok(())
 }
 
-/// A warning as one line for a person: `warning: ...`.
+/// Formats a warning as one line: `warning: ...`.
 struct PlainWarning;
 
 impl<S, N> FormatEvent<S, N> for PlainWarning

@@ -32,7 +32,7 @@ pub struct Leaving {
 }
 
 impl Leaving {
-    /// In words.
+    /// Describes it in words.
     pub fn text(&self) -> String {
         let Self { t, column, value, trained_on: [low, high] } = self;
         format!(
@@ -42,7 +42,7 @@ impl Leaving {
     }
 }
 
-/// Watches a motion whose samples come in pieces; keeps few of them.
+/// Records a motion whose samples arrive in pieces; stores few of them.
 pub struct MotionRecord {
     domain: Domain<f64>,
     columns: Vec<String>,
@@ -50,7 +50,7 @@ pub struct MotionRecord {
     pub leaving: Option<Leaving>,
     /// Time of the last sample.
     pub end: f64,
-    /// Value of `p.v - L` at the start, and its largest distance from that.
+    /// Value of `p.v - L` at the start, and its largest deviation from that.
     pub energy: (f64, f64),
     /// Times, and values of every column and of the energy, of every `stride`-th sample.
     times: Vec<f64>,
@@ -60,7 +60,7 @@ pub struct MotionRecord {
 }
 
 impl MotionRecord {
-    /// Watches the motion of a model with these columns that was trained on `domain`.
+    /// Starts recording a motion; `columns` are those of the model, and `domain` contains its training states.
     pub fn new(domain: Domain<f64>, columns: &[String]) -> Self {
         let values = vec![Vec::new(); columns.len() + 1];
         let columns = columns.to_vec();
@@ -68,7 +68,7 @@ impl MotionRecord {
         Self { domain, columns, leaving: None, end: f64::NAN, energy, times: Vec::new(), values, stride: 1, seen: 0 }
     }
 
-    /// Takes the next samples.
+    /// Records the next samples.
     pub fn add(&mut self, piece: &Trajectory<f64>) {
         for k in 0..piece.len() {
             let (q, v) = piece.state(k);
@@ -141,16 +141,16 @@ pub struct Facts<'a> {
     pub evaluations: usize,
     /// Iterations of an implicit method.
     pub iterations: Option<usize>,
-    /// Energy at the end less that at the start, for a model with friction or under forces.
+    /// Energy at the end minus energy at the start, for a model with friction or under forces.
     pub energy_change: Option<f64>,
     /// Work of the known forces.
     pub work: Option<f64>,
-    /// Energy taken by friction.
+    /// Energy dissipated by friction.
     pub dissipated: Option<f64>,
     /// What took the energy, in words.
     #[serde(skip)]
     pub taken_by: &'static str,
-    /// Energy taken by impacts.
+    /// Energy lost in impacts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub impacts: Option<f64>,
     /// Energy that friction and forces do not explain.
@@ -158,7 +158,7 @@ pub struct Facts<'a> {
     /// The quantity that the motion conserves without friction and forces, and its drift.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub conserved: Option<Conserved>,
-    /// The events that happened, of a system that has some.
+    /// The events of the motion, if the system defines any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub events: Option<Vec<Map<String, Value>>>,
     /// Where the motion left the training range.
@@ -185,7 +185,7 @@ pub struct Conserved {
 }
 
 impl Conserved {
-    /// From the value of `p.v - L`, half of `g(v, v)`, at the start and its largest change.
+    /// Creates it from `p.v - L`, which is half of `g(v, v)`, at the start, and from its largest change.
     pub fn new(quantity: Invariant, (start, change): (f64, f64)) -> Self {
         let factor = if quantity == Invariant::Square { 2.0 } else { 1.0 };
         Self { quantity, start: factor * start, largest_change: factor * change }
@@ -202,7 +202,7 @@ impl Conserved {
 }
 
 impl Facts<'_> {
-    /// In words, one line each for the motion and its energy.
+    /// Describes motion and energy in one line each.
     pub fn text(&self) -> String {
         let unit = self.time_unit.filter(|unit| *unit != "1").map_or(String::new(), |unit| format!(" {unit}"));
         let iterations = self
@@ -220,7 +220,7 @@ impl Facts<'_> {
             ),
             _ => String::new(),
         };
-        // The charges begin with it.
+        // The charges already include the energy.
         let kept = self.conserved.as_ref().filter(|_| self.charges.is_none()).map_or(String::new(), Conserved::text);
         let charges = self.charges.map_or(String::new(), Charges::text);
         format!(
@@ -234,7 +234,7 @@ impl Facts<'_> {
         )
     }
 
-    /// One line.
+    /// Formats the facts as one line of JSON.
     ///
     /// # Errors
     /// Numbers that JSON cannot represent.
@@ -243,7 +243,7 @@ impl Facts<'_> {
     }
 }
 
-/// The place of the samples, in words.
+/// Describes where the samples were written.
 pub fn place(out: &Path) -> String {
     if input::is_standard(out) { "standard output".to_string() } else { out.display().to_string() }
 }

@@ -1,4 +1,4 @@
-//! MotionSource of a roll-out: a trained model, or a system.
+//! Source of the motion for a roll-out: a trained model, or a system.
 
 use crate::forces::KnownForce;
 use crate::learned::{Learned, model_file};
@@ -18,7 +18,7 @@ pub struct MotionSource {
     pub model: Box<dyn EulerLagrange<f64>>,
     /// Coordinates, then velocities.
     pub columns: Vec<String>,
-    /// Their units; of a system that was only recorded `rad` of angles, `SI` of others.
+    /// Units of the columns; for a system known only from recordings, `rad` for angles and `SI` for others.
     pub units: Vec<String>,
     /// Events of the system.
     pub events: Vec<Event<f64>>,
@@ -30,7 +30,7 @@ pub struct MotionSource {
     pub instance: Option<SystemInstance<f64>>,
     /// The states a model was trained on.
     pub domain: Option<Domain<f64>>,
-    /// Unit of times; a recorded system, or a system of another version, has none.
+    /// Unit of time; unknown for a recorded system, or a system of another version.
     pub time_unit: Option<String>,
     /// `true` if a time is among the coordinates, so that the parameter of the motion is another one.
     pub time_like: bool,
@@ -83,7 +83,7 @@ impl MotionSource {
         Ok(Self { name, model, columns, units, events, forces, inputs, instance, domain, time_unit, time_like, file })
     }
 
-    /// Splits the values of `--force`: external forces stay, inputs become the model's.
+    /// Splits the values of `--force`: returns external forces, and gives inputs to the model.
     ///
     /// # Errors
     /// A usage error for constraints that leave no motion.

@@ -1,4 +1,4 @@
-//! Values of the command line: numbers with their ranges, choices by name.
+//! Parses values of the command line: numbers within ranges, and choices by name.
 
 use crate::CliError;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -8,7 +8,7 @@ use lnn::rollout::RolloutOptions;
 use lnn::scalar::Scalar;
 use lnn::storage::MOST_THREADS;
 
-/// Precision that a command computes in.
+/// Precision of a computation.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub enum Precision {
     /// Single, 9 digits.
@@ -65,7 +65,7 @@ pub fn number(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + C
     }
 }
 
-/// A bound, every digit of it.
+/// Formats a bound with all digits.
 fn digits(x: f64) -> String {
     if x == 0.0 || (1e-4..1e6).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
@@ -167,7 +167,7 @@ pub fn named<S: Scalar>(option: &str, text: &str, names: &[String]) -> Result<Ve
     Ok(values.into_iter().flatten().collect())
 }
 
-/// The parts of a text between commas outside parentheses.
+/// Splits a text at commas outside parentheses.
 fn outer_parts(text: &str) -> impl Iterator<Item = &str> {
     let mut depth = 0_i32;
     text.split(move |c: char| {
@@ -176,7 +176,7 @@ fn outer_parts(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// The index of a name among those known; `what` says what they name, and `option` is the name of the option.
+/// Finds the index of a name in a list; `what` describes the list and `option` is the name of the option, both for the message.
 ///
 /// # Errors
 /// A usage error with the nearest known name.

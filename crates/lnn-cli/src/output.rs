@@ -1,4 +1,4 @@
-//! Standard output, closed pipes and full disks included.
+//! Writes to standard output; handles closed pipes and full disks.
 
 use crate::CliError;
 use lnn::findings::Findings;
@@ -22,7 +22,7 @@ pub fn print_bytes(bytes: &[u8]) -> Result<(), CliError> {
     out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| CliError::output(&e))
 }
 
-/// A result as one JSON object or as text.
+/// Formats a result as one JSON object or as text.
 ///
 /// # Errors
 /// A data error for numbers that JSON cannot represent.
@@ -30,7 +30,7 @@ pub fn shown<T: Serialize>(result: &T, json: bool, findings: impl FnOnce(&T) -> 
     if json { self::json(result) } else { Ok(findings(result).to_string()) }
 }
 
-/// A result as a line of JSON.
+/// Formats a result as a line of JSON.
 ///
 /// # Errors
 /// A data error for numbers that JSON cannot represent.

@@ -12,11 +12,11 @@ pub struct Wanted<'a> {
     pub out: Option<&'a Path>,
     /// Default directory.
     pub usual: &'a Path,
-    /// `true` if results that are there may be replaced.
+    /// `true` if existing results may be replaced.
     pub overwrite: bool,
     /// Files that the command reads.
     pub inputs: &'a [&'a Path],
-    /// Who writes.
+    /// Kind of the command that writes.
     pub writer: Writer,
 }
 
@@ -61,7 +61,7 @@ pub fn open(wanted: &Wanted<'_>) -> Result<Folder, CliError> {
     Err(CliError::file(usual, "there are no free numbers for another directory"))
 }
 
-/// `NAME-2`.
+/// Appends a number to a path, as in `NAME-2`.
 fn numbered(path: &Path, number: u32) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!("-{number}"));

@@ -1,4 +1,4 @@
-//! `lnn page`: a model as a page to play with.
+//! `lnn page`: writes a model as an interactive page.
 
 use crate::CliError;
 use crate::files::OutputFile;
@@ -28,7 +28,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let path = model_file(&args.model)?;
     let out = OutputFile::claim(&args.out, &[&path], args.overwrite)?;
     let learned = Learned::<f64>::load(&path)?;
-    // Recorded motion has no exact system.
+    // For recorded motion, no exact system is known.
     let system = learned.system(&path).ok();
     let text = page(&learned.header, &learned.network, system.as_ref()).map_err(|e| CliError::file(&path, e))?;
     out.write(text.as_bytes())?;

@@ -1,4 +1,4 @@
-//! Names that become names of directories.
+//! Names that may be used as directory names.
 
 use crate::thresholds::LONGEST_NAME;
 

@@ -1,4 +1,4 @@
-//! Commented configurations and the reference of all keys: what a key means, its allowed values and the value it has.
+//! Prints commented configurations and the reference of all keys: meaning, allowed values and present value.
 
 use crate::thresholds::COMMENT_WIDTH;
 use lnn::configuration::{Below, Config, Key, join};
@@ -25,7 +25,7 @@ pub fn commented(keys: &[Key], root: &Table, remark: &dyn Fn(&str) -> Option<Str
     text
 }
 
-/// Writes the keys of a table at `path`, then the tables within; the meaning of a key is explained once.
+/// Writes the keys of a table at `path`, then its subtables; each key is explained only once.
 fn write_table(
     keys: &[Key],
     table: Option<&Table>,
@@ -103,7 +103,7 @@ pub fn fit_reference() -> String {
 
 /// Writes the reference of keys and of the tables within, with `values`, which are described by `whose`.
 fn describe(keys: &[Key], values: &Json, whose: &str, page: &mut String) {
-    // Brackets outside of code would be links.
+    // Brackets outside code would become links.
     let cell = |text: &str| text.replace('|', "\\|").replace('[', "\\[");
     let (own, tables): (Vec<&Key>, Vec<&Key>) = keys.iter().partition(|key| matches!(key.below, Below::Value));
     if !own.is_empty() {
@@ -126,13 +126,13 @@ fn describe(keys: &[Key], values: &Json, whose: &str, page: &mut String) {
     }
 }
 
-/// A key as TOML writes it.
+/// Formats a key for TOML.
 fn quoted(name: &str) -> String {
     let bare = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     if bare { name.to_string() } else { Value::from(name).to_string() }
 }
 
-/// Comment lines of at most [`COMMENT_WIDTH`] characters.
+/// Formats comment lines of at most [`COMMENT_WIDTH`] characters.
 fn comment(text: &str) -> String {
     let (mut lines, mut line) = (String::new(), String::from("#"));
     for word in text.split_whitespace() {

@@ -1,4 +1,4 @@
-//! A system or a model under investigation, the states at which it is evaluated, and functions of its coordinates.
+//! A system or a model to be analysed, the states at which it is evaluated, and functions of its coordinates.
 
 use crate::CliError;
 use crate::learned::{Learned, held};
@@ -23,7 +23,8 @@ pub struct Probe {
     pub model: Box<dyn EulerLagrange<f64>>,
     /// Coordinates, then velocities.
     pub columns: Vec<String>,
-    /// The states of interest: for a system, those on which errors are stated; for a model, the middle of the training states.
+    /// The region of states to examine: for a system, the states on which errors are reported; for a model, the central part of the
+    /// training states.
     pub region: Region,
     /// `true` for a system, whose terms are exact.
     pub exact: bool,
@@ -39,7 +40,7 @@ pub struct Probe {
 /// `NAME=LOW:HIGH`, the bounds of a column.
 pub type Bound = (String, [f64; 2]);
 
-/// Reads [`Bound`].
+/// Parses a [`Bound`].
 ///
 /// # Errors
 /// The form that was expected.
@@ -55,7 +56,7 @@ pub fn bound(text: &str) -> Result<Bound, String> {
     if wide && !name.trim().is_empty() { Ok((name.trim().to_string(), [low, high])) } else { Err(wrong()) }
 }
 
-/// Reads the largest singular value at which a field counts as a symmetry.
+/// Parses the largest singular value at which a field counts as a symmetry.
 ///
 /// # Errors
 /// The range.
@@ -98,7 +99,7 @@ impl Probe {
     fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let configure = |system| configure_system::<f64>(system, given).map_err(CliError::usage);
         let mut configured = configure(system_arg::system(name)?)?;
-        // Properties of a Lagrangian do not depend on the drive of the system.
+        // The drive of a system is removed, because properties of a Lagrangian do not depend on it.
         if let Some(driven) = configured.system.description().filter(|_| configured.is_timed()) {
             let mut free = driven.clone();
             free.forces.clear();
@@ -192,7 +193,7 @@ impl Probe {
         Ok(())
     }
 
-    /// Narrows the states of both to their common ones.
+    /// Restricts both regions to their intersection.
     ///
     /// # Errors
     /// A usage error if there are none.
@@ -248,7 +249,7 @@ impl Probe {
         }
     }
 
-    /// Point symmetries: in the basis that shows the most of them, of such in the one with the widest gap.
+    /// Finds the point symmetries in the basis that shows the most of them; among equal ones, in the basis with the widest gap.
     ///
     /// # Errors
     /// A data error if nothing can be found out.
@@ -262,7 +263,7 @@ impl Probe {
         most_symmetries(self.model.as_ref(), bases, states, (tolerance, self.exact)).map_err(CliError::data)
     }
 
-    /// States that are examined for a number of unknown coefficients.
+    /// Number of states to examine for a number of unknown coefficients.
     pub fn enough(&self, unknowns: usize) -> usize {
         enough(unknowns, self.exact)
     }

@@ -8,10 +8,11 @@ use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Progress through a known number of steps; silent when standard error is not a terminal, but for a line now and then of a search.
+/// Progress bar for a known number of steps. If standard error is not a terminal, it is silent, except for an occasional line during a
+/// search.
 pub struct Progress {
     bar: ProgressBar,
-    /// When the next line is due.
+    /// Time at which the next line is due.
     line: Mutex<Instant>,
 }
 
@@ -31,17 +32,17 @@ impl Progress {
         Self { bar, line: Mutex::new(Instant::now() + FIRST_LINE) }
     }
 
-    /// `done` steps are done.
+    /// Sets the number of finished steps.
     pub fn advance(&self, done: u64) {
         self.bar.set_position(done);
     }
 
-    /// A word about the work at hand.
+    /// Shows a short description of the current work.
     pub fn say(&self, text: &str) {
         self.bar.set_message(text.to_string());
     }
 
-    /// How far a search is, which has no known number of steps.
+    /// Shows the progress of a search, whose number of steps is unknown.
     pub fn search(&self, text: &str) {
         if !self.bar.is_hidden() {
             if self.bar.length() == Some(0) {

@@ -50,14 +50,14 @@ pub struct RecordingArgs {
     pub columns: Vec<String>,
 }
 
-/// Dashes for a contradiction that begins with an option's name without them.
+/// Returns `--` if the message begins with the name of an option, otherwise an empty text.
 fn option(problem: &str) -> &'static str {
     let options =
         ["coords:", "velocity:", "acceleration:", "force:", "error:", "periodic:", "units:", "rate:", "columns:"];
     if options.iter().any(|name| problem.starts_with(name)) { "--" } else { "" }
 }
 
-/// `column=unit`.
+/// Parses `column=unit`.
 pub fn unit(text: &str) -> Result<(String, String), String> {
     lnn::pipeline::unit(text).ok_or_else(|| "expected COLUMN=UNIT".to_string())
 }
@@ -102,7 +102,7 @@ impl RecordingArgs {
         }
     }
 
-    /// The options of a meaning of the columns, each after a blank, for the files of these arguments.
+    /// Formats the options that state these column meanings for the same files, each after a blank.
     pub fn command(&self, columns: &Columns) -> String {
         let quoted = |text: &str| match text.chars().all(|c| c.is_ascii_alphanumeric() || "_-./,=+:".contains(c)) {
             true if !text.is_empty() => text.to_string(),
@@ -117,7 +117,7 @@ impl RecordingArgs {
             ("velocity", &columns.velocity),
             ("acceleration", &columns.acceleration),
             ("force", &columns.force),
-            // The default names need not be stated.
+            // Default names are omitted.
             ("time", &one(&columns.time.clone().filter(|name| name != "t" && name != "time"))),
             ("rate", &one(&columns.rate.map(|rate| rate.to_string()))),
             ("trajectory", &one(&columns.trajectory)),
@@ -149,7 +149,7 @@ impl RecordingArgs {
     }
 }
 
-/// States the guessed roles of the columns, if there was a guess.
+/// Prints the guessed roles of the columns, if there was a guess.
 fn note(columns: &Columns, table: &[ColumnGuess]) {
     if !table.is_empty() {
         let (coords, angles) = (columns.coords.join(", "), columns.periodic.join(", "));
@@ -169,7 +169,7 @@ pub fn read(files: &[PathBuf], columns: &Columns) -> Result<LoadedRecording, Cli
     Ok(reading)
 }
 
-/// Says how many rows are left out because a reading is missing.
+/// Reports how many rows are left out because a reading is missing.
 fn note_incomplete(reading: &LoadedRecording) {
     if reading.incomplete > 0 {
         let rows = pluralize(reading.incomplete, "row with an empty field is", "rows with an empty field are");
@@ -177,7 +177,7 @@ fn note_incomplete(reading: &LoadedRecording) {
     }
 }
 
-/// A mistake in files or in the meaning of their columns.
+/// Converts a mistake in files or in column meanings to an error.
 fn refused(error: &DataError, columns: &Columns) -> CliError {
     match error {
         DataError::File { problem, .. } => CliError::data(format_args!("{error}{}", help(columns, problem))),
@@ -189,7 +189,7 @@ fn refused(error: &DataError, columns: &Columns) -> CliError {
     }
 }
 
-/// The option that helps, with a colon before it.
+/// The option that helps, preceded by a colon.
 fn help(columns: &Columns, problem: &Problem) -> &'static str {
     match problem {
         Problem::NoTime { .. } => ": --time COLUMN or --rate HZ",

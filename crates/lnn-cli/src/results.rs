@@ -1,4 +1,4 @@
-//! Results that runs leave in their directories: who finds them there, and how another run replaces them.
+//! Results in the directories of runs: detects them, and removes them when another run replaces them.
 
 use crate::CliError;
 use crate::files::{holds_something, same_file};
@@ -11,15 +11,15 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Files that evaluations write; trainings and fits have the last three as well.
+/// Files that evaluations write; trainings and fits also write the last three.
 const EVALUATED: [&str; 4] = ["evaluation.json", "report.html", CAPTIONS, PLAY];
 
-/// Who wants to write into a directory.
+/// Kind of the command that writes into a directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Writer {
     /// A training or a fit.
     Learner,
-    /// An evaluation: it never takes the place of a model.
+    /// An evaluation, which never replaces a model.
     Evaluator,
 }
 
@@ -38,7 +38,7 @@ pub fn found(directory: &Path) -> Option<String> {
     if names.is_empty() { None } else { Some(described(directory).unwrap_or_else(|| listed(&names))) }
 }
 
-/// `true` if a file's name is a picture's.
+/// `true` if a file name is that of a picture.
 fn is_picture(name: &str) -> bool {
     name.ends_with(".svg") || name.ends_with(".png")
 }
@@ -52,7 +52,7 @@ fn pictures(directory: &Path) -> Vec<String> {
     names
 }
 
-/// The first few names.
+/// Lists the first few names.
 fn listed(names: &[String]) -> String {
     let more =
         if names.len() > SHOWN_NAMES { format!(" and {} more", names.len() - SHOWN_NAMES) } else { String::new() };
@@ -82,7 +82,7 @@ fn described(directory: &Path) -> Option<String> {
     read("evaluation.json").map(|Summary { system, seed, .. }| format!("an evaluation of {system} (seed {seed})"))
 }
 
-/// Refuses a directory where writing would overwrite what the command reads.
+/// Rejects a directory in which writing would overwrite an input of the command.
 ///
 /// # Errors
 /// A data error naming the file.
@@ -100,7 +100,7 @@ pub fn require_no_input(directory: &Path, inputs: &[&Path]) -> Result<(), CliErr
     Ok(())
 }
 
-/// Refuses a directory that contains a run, unless it may be replaced; an evaluation never replaces a model.
+/// Rejects a directory that contains a run, unless it may be replaced; an evaluation never replaces a model.
 ///
 /// # Errors
 /// A data error that names the contents.
@@ -135,7 +135,7 @@ pub fn remove_stale(directory: &Path) -> Result<(), PipelineError> {
         let path = entry.path();
         if numbered && entry.file_type().is_ok_and(|kind| kind.is_dir()) && path.join(EVALUATED[0]).is_file() {
             remove(&path, &[&EVALUATED[..], &[RUN]].concat())?;
-            // A directory with other contents stays.
+            // A directory with other contents is kept.
             let _ = fs::remove_dir(&path);
         }
     }

@@ -1,4 +1,4 @@
-//! Runs that `--resume DIR` of `lnn train` and `lnn fit` finds in the directory.
+//! Finds the run that `--resume DIR` of `lnn train` and `lnn fit` continues.
 
 use crate::differences::differences;
 use crate::folder::Folder;
@@ -39,7 +39,7 @@ pub fn reopen<T>(
     json: bool,
     read: impl FnOnce(SavedText<'_>) -> Result<T, CliError>,
 ) -> Result<Option<(Folder, T)>, CliError> {
-    // Searched before anything is created, and again when no other process can write.
+    // The search is repeated under the lock, when no other process can write.
     find(directory, command)?;
     let folder = Folder::open(directory)?;
     match find(directory, command)? {
@@ -53,7 +53,7 @@ pub fn reopen<T>(
     }
 }
 
-/// `true` if a directory holds a training that can continue.
+/// `true` if a directory contains a training that can be continued.
 pub fn has_checkpoint(directory: &Path) -> bool {
     [LATEST, PREVIOUS].iter().any(|name| directory.join(name).exists())
 }
@@ -98,7 +98,7 @@ fn finished(directory: &Path) -> Result<Found, CliError> {
     }
 }
 
-/// The contents of the text of a run.
+/// Parses the text of a run.
 ///
 /// # Errors
 /// A data error naming the file.
@@ -108,7 +108,7 @@ pub fn parse<T: DeserializeOwned>(directory: &Path, name: &str, text: &str) -> R
     })
 }
 
-/// Refuses to continue with a configuration that differs from that of the directory.
+/// Rejects a configuration that differs from that of the directory.
 ///
 /// # Errors
 /// A usage error naming what differs.
@@ -120,7 +120,7 @@ pub fn require_same<T: Serialize>(directory: &Path, saved: &T, asked: &T) -> Res
     }
 }
 
-/// The command that continues with the run whose checkpoint is in a directory.
+/// The command that continues the run whose checkpoint is in a directory.
 pub fn command(directory: &Path) -> String {
     let verb = Command::of(directory).unwrap_or(Command::Train).name();
     let text = directory.display().to_string();
@@ -141,7 +141,7 @@ pub fn continuation_hint(directory: &Path) -> String {
     }
 }
 
-/// An error that ended a run with results, such as a full disk: its checkpoint is still there, and the message says so.
+/// Adds to an error, such as a full disk, that the checkpoint still exists.
 pub fn with_continuation(directory: &Path) -> impl Fn(CliError) -> CliError {
     |error| {
         if error.kind() == Kind::Data && has_checkpoint(directory) {
@@ -153,7 +153,7 @@ pub fn with_continuation(directory: &Path) -> impl Fn(CliError) -> CliError {
     }
 }
 
-/// Removes the checkpoints of a training that is over.
+/// Removes the checkpoints of a finished training.
 ///
 /// # Errors
 /// A data error naming the directory.

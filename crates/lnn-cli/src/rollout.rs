@@ -1,4 +1,4 @@
-//! `lnn rollout`: the motion of a model from one state.
+//! `lnn rollout`: predicts the motion of a model from one state.
 
 use crate::charges::Charges;
 use crate::constraints::constrained;
@@ -138,7 +138,7 @@ impl Args {
         Ok(options)
     }
 
-    /// Refuses to overwrite existing files or inputs.
+    /// Rejects overwriting existing files or inputs.
     fn require_room(&self, source: &MotionSource) -> Result<(), CliError> {
         let files = self.forces.files().chain(self.tube.files());
         let inputs: Vec<_> = files.chain(source.file.as_deref()).chain(self.constraints.as_deref()).collect();
@@ -155,7 +155,7 @@ impl Args {
         Ok(())
     }
 
-    /// Refuses options that exclude one another.
+    /// Rejects options that exclude each other.
     fn check(&self, source: &MotionSource, is_driven: bool) -> Result<(), CliError> {
         if self.json && input::is_standard(&self.out) {
             return Err(CliError::usage("--json: the trajectory takes standard output (--out -)"));
@@ -203,7 +203,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     }
     let result = integrate(model, force.as_ref(), (q, v), &options, &mut samples)?;
     if !input::is_standard(&args.out) {
-        // Another program may have written it meanwhile.
+        // Another program may have written the file in the meantime.
         args.require_room(&source)?;
     }
     let (watch, tube, kept) = samples.finish()?;
@@ -231,7 +231,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     args.summarize((&source, &watch), &result, force.is_some(), (charges.as_ref(), tube.as_ref(), table.as_ref()))
 }
 
-/// The motion of a model from a state, under a force if there is one; its samples are taken as they come.
+/// Integrates the motion of a model from a state, under a force if there is one, and processes the samples as they arrive.
 fn integrate(
     model: &dyn EulerLagrange<f64>,
     force: Option<&KnownForce>,
@@ -278,7 +278,7 @@ impl Args {
     ) -> Result<(), CliError> {
         let (statistics, balance) = (&result.statistics, result.balance.as_ref());
         let model = source.model.as_ref();
-        // Constraints that move and forces change it.
+        // A free motion conserves the energy; moving constraints and forces change it.
         let is_free = !is_driven && balance.is_none() && model.manifold().is_none();
         let invariant = if is_free { watch.invariant(model) } else { None };
         let facts = Facts {
@@ -320,10 +320,10 @@ impl Args {
     }
 }
 
-/// Reports how many directions of the motion are a free choice.
+/// Reports the number of directions in which the motion is not determined.
 fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
     let mut terms = Terms::default();
-    // The motion itself reports failures.
+    // Failures are reported by the motion itself.
     let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
     let open = ReducedMass::of(q.len(), &terms.mass_matrix, &terms.constraint_matrix);
     let open = open.map_or(0, |reduced| reduced.null_directions(ROUNDINGS_OF_ZERO).len());
@@ -333,7 +333,7 @@ fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
     ));
 }
 
-/// An error for a motion that is rejected before it begins, with the wrong option.
+/// Converts the rejection of a motion before it starts to an error that names the option.
 fn refused(error: &RolloutError) -> CliError {
     if let RolloutError::OffConstraints { nearest, .. } = error {
         let nearest: Vec<String> = nearest.iter().map(f64::to_string).collect();
@@ -350,7 +350,7 @@ fn refused(error: &RolloutError) -> CliError {
     CliError::usage(format_args!("{option}: {problem}"))
 }
 
-/// Why a motion ended early, and the option that helps.
+/// Explains why a motion ended early, and names the option that helps.
 fn ended(stop: &RolloutError, (columns, constraints): (&[String], &[String]), method: Integrator) -> String {
     let fixed = method.is_structure_preserving();
     match stop {

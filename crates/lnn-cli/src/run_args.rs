@@ -50,7 +50,7 @@ pub struct RunArgs {
     pub json: bool,
 }
 
-/// Interval of checkpoints: `10` epochs, `90s`.
+/// Parses the interval of checkpoints: `10` epochs, `90s`.
 fn every(text: &str) -> Result<CheckpointInterval, String> {
     match text.trim().strip_suffix('s') {
         Some(text) => seconds(text).map(CheckpointInterval::Seconds),
@@ -86,8 +86,8 @@ impl RunArgs {
     }
 }
 
-/// Gives the phases of merged layers, whose training is at `path`, a `t_max` equal to the epochs if only the epochs were given and the
-/// schedule has no periods.
+/// Sets `t_max` of the phases equal to their epochs, if only the epochs were given and the schedule is not periodic; `path` is that of the
+/// training in the merged layers.
 pub fn fill_periods(config: &mut Config, layers: &Layers, path: &str) {
     for (k, phase) in config.phases.iter_mut().enumerate() {
         let has = |key: &str| layers.has(&format!("{path}phase[{k}].{key}"));
@@ -97,7 +97,7 @@ pub fn fill_periods(config: &mut Config, layers: &Layers, path: &str) {
     }
 }
 
-/// Adds the values that options of the training's network, at `path`, add_implied for other keys.
+/// Adds the values that options of the network imply for other keys; `path` is that of the training.
 pub fn add_implied(layers: &mut Layers, path: &str, timed: bool) {
     let at = |key: &str, value: Value| (format!("{path}{key}"), value);
     layers.add_implied(&format!("{path}network.structure"), |structure| {
@@ -114,19 +114,19 @@ pub fn add_implied(layers: &mut Layers, path: &str, timed: bool) {
         }
         also
     });
-    // A known part has its own kinetic energy, and the output of the network beside it starts near zero.
+    // A known part has its own kinetic energy, and the output of the additional network starts near zero.
     layers.add_implied(&format!("{path}network.known"), |_| {
         vec![at("network.alpha", 0.0.into()), at("network.initialization", "near-zero".into())]
     });
 }
 
-/// The structure that the layers give to the network at `path`.
+/// The structure that the layers set for the network at `path`.
 pub fn structure(layers: &Layers, path: &str) -> Option<Structure> {
     let name = layers.text(&format!("{path}network.structure"))?;
     Structure::ALL.into_iter().find(|known| known.name() == name)
 }
 
-/// Makes the phases last `total` epochs together, in the proportions they have.
+/// Scales the epochs of the phases in proportion so that they sum to `total`.
 fn scale_epochs(config: &mut Config, total: usize) -> Result<(), CliError> {
     let phases = config.phases.len();
     if total < phases {
@@ -138,7 +138,7 @@ fn scale_epochs(config: &mut Config, total: usize) -> Result<(), CliError> {
     let (mut before, mut given) = (0, 0);
     for (k, phase) in config.phases.iter_mut().enumerate() {
         before += phase.epochs;
-        // An epoch at least for this phase and for each of the later ones.
+        // At least one epoch remains for this phase and for each later one.
         let end = (total as f64 * before as f64 / all as f64).round() as usize;
         let end = end.clamp(given + 1, total - (phases - 1 - k));
         phase.t_max *= (end - given) as f64 / phase.epochs as f64;

@@ -19,15 +19,15 @@ pub struct Listed {
 /// State of a run.
 #[derive(Debug)]
 enum State {
-    /// It has a record of its configuration.
+    /// It has a record of the same configuration.
     Finished,
     /// It has a record of another configuration.
     OtherConfiguration,
-    /// It has a file that cannot be read, and why.
+    /// It has a file that cannot be read, with the reason.
     Damaged(&'static str, String),
-    /// A process works on it; which one, if known.
+    /// A process works on it; contains the process, if known.
     InProgress(Option<LockOwner>),
-    /// No process works on it; `true` if it resumes from a checkpoint.
+    /// No process works on it; contains `true` if it can resume from a checkpoint.
     Open(bool),
 }
 
@@ -58,7 +58,7 @@ fn state(directory: &Path, run: &Run) -> Result<State, CliError> {
 }
 
 impl Listed {
-    /// Cells of a table, with the name of the experiment.
+    /// Formats a table row, with the name of the experiment.
     pub fn row(&self, experiment: &str) -> Vec<String> {
         let state = match &self.state {
             State::Finished => "finished".to_string(),
@@ -72,7 +72,7 @@ impl Listed {
         vec![self.number.to_string(), experiment.to_string(), self.run.name.clone(), state]
     }
 
-    /// This entry as an object.
+    /// Formats the run as a JSON object.
     pub fn json(&self, experiment: &str, scale: Option<&str>) -> Value {
         let (state, owner) = match &self.state {
             State::Finished => ("finished", None),

@@ -1,4 +1,4 @@
-//! Runs of an experiment or a sweep, whole or in shares: performed, listed, gathered in tables. Finished runs are not run again.
+//! Runs an experiment or a sweep, completely or in shares; lists its runs, and combines them in tables. Finished runs are not repeated.
 
 use crate::files::require_free;
 use crate::number::threads;
@@ -19,24 +19,24 @@ use std::path::{Path, PathBuf};
 pub struct Work {
     /// The experiment that they belong to.
     pub experiment: Box<dyn Experiment>,
-    /// Directory.
+    /// Directory of the runs.
     pub path: PathBuf,
     /// Runs with their numbers.
     pub runs: Vec<(usize, Run)>,
-    /// The command that makes the tables of all shares.
+    /// The command that combines all shares in tables.
     pub merge: String,
     /// The command that lists the runs.
     pub list: String,
-    /// Files that were read for it, which are never overwritten.
+    /// Files that were read for it; they are never overwritten.
     pub inputs: Vec<PathBuf>,
 }
 
-/// How runs are performed.
+/// Settings for performing runs.
 #[derive(Clone, Copy, Debug)]
 pub struct Orders {
-    /// Threads; all if not given.
+    /// Number of threads; by default, all.
     pub threads: Option<usize>,
-    /// A share of the runs; that of a Slurm array, or all, if not given.
+    /// The share of the runs to perform; by default, that of a Slurm array, or all.
     pub shard: Option<Shard>,
     /// `true` to replace finished runs of other configurations.
     pub overwrite: bool,
@@ -49,7 +49,7 @@ impl Work {
         self.runs.iter().map(|(_, run)| run)
     }
 
-    /// Refuses tables that cannot be written, or that the command reads.
+    /// Rejects tables that cannot be written, or that are inputs of the command.
     fn require_writable(&self) -> Result<(), CliError> {
         let inputs: Vec<&Path> = self.inputs.iter().map(PathBuf::as_path).collect();
         let tables = TABLES.iter().chain(self.experiment.tables());
@@ -103,7 +103,7 @@ pub fn perform(all: Vec<Work>, orders: &Orders) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Makes table, pictures and report of the records that are there.
+/// Writes table, pictures and report from the existing records.
 ///
 /// # Errors
 /// A data error for a directory that cannot be written or records that are missing, an interruption.
@@ -136,7 +136,7 @@ pub fn merge(all: Vec<Work>, json: bool) -> Result<(), CliError> {
     }
 }
 
-/// The runs of a share, for experiments that have any in it.
+/// Selects the runs of a share, and drops experiments without any.
 fn share(all: Vec<Work>, shard: Option<Shard>) -> Vec<Work> {
     let Some(shard) = shard else { return all };
     let of = |mut work: Work| {
@@ -146,7 +146,7 @@ fn share(all: Vec<Work>, shard: Option<Shard>) -> Vec<Work> {
     all.into_iter().map(of).filter(|work| !work.runs.is_empty()).collect()
 }
 
-/// Refuses a directory with finished runs of configurations other than the requested ones; `hint` says what to do then.
+/// Rejects a directory with finished runs of other configurations; `hint` advises what to do.
 fn require_same(work: &Work, hint: &str) -> Result<(), CliError> {
     let store = ExperimentDirectory::new(&work.path);
     let mut others = Vec::new();
@@ -160,12 +160,12 @@ fn require_same(work: &Work, hint: &str) -> Result<(), CliError> {
     Err(CliError::file(&work.path.join(first), problem))
 }
 
-/// How many others there are.
+/// Formats the number of further items.
 fn and_more(count: usize) -> String {
     if count == 0 { String::new() } else { format!(" (and {count} more)") }
 }
 
-/// Runs with unreadable files: each file and its problem.
+/// Lists the unreadable files of runs, each with its problem.
 fn damaged(work: &Work) -> Result<Vec<String>, CliError> {
     let store = ExperimentDirectory::new(&work.path);
     let mut found = Vec::new();

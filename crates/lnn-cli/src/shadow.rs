@@ -1,4 +1,4 @@
-//! `lnn shadow`: rays of light through a metric, as a picture of the shadow and the sky around it.
+//! `lnn shadow`: traces light through a metric, and draws the shadow and the sky around it.
 
 use crate::files::{OutputFile, file_ending};
 use crate::learned::{Learned, model_file};
@@ -83,7 +83,7 @@ pub struct Args {
     json: bool,
 }
 
-/// Motions of the camera.
+/// Possible motions of the camera.
 const OBSERVERS: [(&str, Observer, &str); 2] = [
     ("rest", Observer::Rest, "At rest"),
     (
@@ -93,17 +93,17 @@ const OBSERVERS: [(&str, Observer, &str); 2] = [
     ),
 ];
 
-/// Directions around the centre.
+/// Parses the number of directions around the centre.
 fn edges(text: &str) -> Result<usize, String> {
     let number = weight(text).ok().filter(|x| x % 4.0 == 0.0 && *x <= MOST_EDGES);
     number.map(|x| x as usize).ok_or_else(|| format!("expected a multiple of four from 0 to {MOST_EDGES}"))
 }
 
-/// The metrics to look through, with the names of their coordinates.
+/// The metrics through which light is traced, with the names of their coordinates.
 struct Metrics {
     system: String,
     coordinates: Vec<String>,
-    /// For each of them, whether it is known to be a periodic angle.
+    /// For each coordinate, whether it is known to be a periodic angle.
     periodic: Vec<bool>,
     /// Unit of the coordinates, if it is known.
     unit: Option<String>,
@@ -162,7 +162,8 @@ impl Args {
         self.far.unwrap_or(self.distance * if self.model.is_none() { SKY_OF_EXACT } else { SKY_OF_LEARNED })
     }
 
-    /// The camera in Cartesian coordinates and its choices; the metrics of wormholes are brought into such coordinates.
+    /// Creates the camera in Cartesian coordinates and the settings of ray tracing; metrics of wormholes are transformed to such
+    /// coordinates.
     fn scene(&self, metrics: &mut Metrics) -> Result<(Camera, Tracing), CliError> {
         let chart = self.chart(&metrics.coordinates)?;
         let far = self.far();
@@ -249,7 +250,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     Ok(())
 }
 
-/// An error with the option that helps.
+/// Converts an error and adds the option that helps.
 fn refused(error: RelativityError) -> CliError {
     match &error {
         RelativityError::Invalid { what, expected, .. } => match *what {

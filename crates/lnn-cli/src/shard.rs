@@ -12,7 +12,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// `true` if the run of this number belongs to the share.
+    /// `true` if the run with this number belongs to the share.
     pub fn holds(self, number: usize) -> bool {
         number % self.count == self.index - 1
     }
@@ -22,8 +22,8 @@ impl Shard {
         self.count > 1
     }
 
-    /// The share of a task of a Slurm array, by the variables that Slurm sets; `None` outside of an array. Arrays may begin at any number
-    /// and take steps; a list such as `1,4,5` does not determine the shares.
+    /// Determines the share of a task in a Slurm array from the variables that Slurm sets; `None` outside an array. Arrays may begin at any
+    /// number and have steps; a list such as `1,4,5` does not determine the shares.
     ///
     /// # Errors
     /// The problem with the variables.
@@ -43,7 +43,7 @@ impl Shard {
             let steps = id.checked_sub(least)?;
             (steps % step == 0 && steps / step < count).then_some(steps / step)
         };
-        // The last of a list with gaps lies beyond its count.
+        // If the list has gaps, its last number exceeds what its count implies.
         let gaps = most.is_some_and(|most| most.saturating_sub(least) / step >= count);
         let index = position(id).filter(|_| !gaps);
         let index = index.ok_or_else(|| unknown(&format!("not one of {count} numbers in even steps from {least}")))?;

@@ -1,4 +1,4 @@
-//! The source of Euler-Lagrange terms: a hand-written system or a trained model.
+//! The source of Euler-Lagrange terms: an analytical system or a trained model.
 
 use crate::learned::Learned;
 use crate::{CliError, forces, output, system_arg};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Builds a value from a system, given by its name or file and the values of its parameters.
 type FromSystem<T> = fn(&str, &[(String, String)]) -> Result<T, CliError>;
 
-/// Something that moves by a Lagrangian, with the names of its state's components.
+/// A Lagrangian with the names of its state's components.
 pub struct Source<S> {
     /// Its terms.
     pub model: Box<dyn EulerLagrange<S>>,
@@ -72,7 +72,7 @@ impl<S: Scalar> Source<S> {
     }
 }
 
-/// Refuses more coordinates than a command supports: its memory or time grows with a power of their number.
+/// Rejects more coordinates than a command supports, because its memory or time grows with a power of their number.
 ///
 /// # Errors
 /// A usage error with the numbers.
@@ -98,7 +98,7 @@ pub struct SystemOrModel {
 }
 
 impl SystemOrModel {
-    /// Reads the given one.
+    /// Reads the system or the model that was given.
     ///
     /// # Errors
     /// Those of its reader.
@@ -110,7 +110,7 @@ impl SystemOrModel {
     }
 }
 
-/// `symbol=value`.
+/// Parses `symbol=value`.
 pub fn parameter(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((symbol, value)) if !symbol.trim().is_empty() && !value.trim().is_empty() => {

@@ -1,4 +1,4 @@
-//! Recorded motion from standard input goes through a temporary file, because arrays are read in several passes.
+//! Copies recorded motion from standard input to a temporary file, because arrays are read in several passes.
 
 use crate::input;
 use crate::thresholds::SPOOL_ATTEMPTS;

@@ -19,13 +19,13 @@ pub struct States<S> {
 /// Mistakes in a file of states; rows are lines of the file, from 1.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum StatesError {
-    /// Nothing in it.
+    /// The file is empty.
     #[error("the file is empty, expected a header with the columns {0}")]
     Empty(String),
     /// Bytes that are not text.
     #[error("row {0}: not UTF-8 text")]
     NotText(usize),
-    /// Numbers where the names of columns should be.
+    /// The first row contains numbers instead of column names.
     #[error("row {row}: expected a header with the columns {names}, found numbers")]
     NoHeader {
         /// The first row.
@@ -41,7 +41,7 @@ pub enum StatesError {
         /// Its name.
         name: String,
     },
-    /// A column that the system does not have.
+    /// The system does not have a column.
     #[error("row {row}: {problem}")]
     Unknown {
         /// Row of the header.
@@ -49,7 +49,7 @@ pub enum StatesError {
         /// Its name and the nearest known one.
         problem: String,
     },
-    /// Columns that are not there.
+    /// Some columns are missing.
     #[error("row {row}: missing column {names}")]
     Missing {
         /// Row of the header.
@@ -57,7 +57,7 @@ pub enum StatesError {
         /// Their names.
         names: String,
     },
-    /// A row with too few or too many fields.
+    /// A row has too few or too many fields.
     #[error("row {row}: expected {}{separated}, found {found}", pluralize(*expected, "field", "fields"))]
     Ragged {
         /// The row.
@@ -69,7 +69,7 @@ pub enum StatesError {
         /// Fields of the row.
         found: usize,
     },
-    /// A field that is not a finite number.
+    /// A field is not a finite number.
     #[error("row {row}, column {column}: expected a finite number, found {found:?}")]
     Field {
         /// The row.
@@ -79,7 +79,7 @@ pub enum StatesError {
         /// Text found there.
         found: String,
     },
-    /// A header and nothing below.
+    /// There is a header but no rows.
     #[error("no states below the header")]
     NoStates,
 }
@@ -129,7 +129,7 @@ pub struct Table<S> {
     pub rows: Vec<usize>,
 }
 
-/// Text of columns: their names, how fields are separated, and the lines of numbers.
+/// Text of a table: column names, separator, and the lines of numbers.
 struct Columns<'a> {
     /// Row of the names.
     row: usize,
@@ -138,7 +138,7 @@ struct Columns<'a> {
     lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
 }
 
-/// Finds the names of the columns; `asked` are the columns that an error lists.
+/// Finds the column names; `asked` are the columns that an error lists.
 fn opened<'a>(bytes: &'a [u8], asked: &str) -> Result<Columns<'a>, StatesError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|e| {
@@ -219,7 +219,7 @@ fn read_header(row: usize, names: &[String], columns: &[String]) -> Result<Vec<O
     if missing.is_empty() {
         return Ok(order);
     }
-    // If a column is missing, an unknown one may be a misprint of it.
+    // If a column is missing, an unknown one may be a misspelling of it.
     let near = |name: &&String| nearest(name, missing.iter().copied()).is_some();
     let foreign = || names.iter().zip(&order).filter(|(_, column)| column.is_none()).map(|(name, _)| name);
     let nothing_known = order.iter().all(Option::is_none);

@@ -66,7 +66,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     perform(work, &Orders { threads, shard, overwrite, json })
 }
 
-/// Refuses values that come to one configuration, as `0.1` and `0.10` do: it would be trained twice.
+/// Rejects values that give the same configuration, such as `0.1` and `0.10`, which would be trained twice.
 fn require_different(configurations: &[(Choice, Config)]) -> Result<(), CliError> {
     let text =
         |choice: &Choice| choice.iter().map(|(key, value)| format!("{key}={value}")).collect::<Vec<_>>().join(" ");
@@ -119,7 +119,7 @@ impl Args {
         Ok(Work { experiment: Box::new(Sweep), path: self.out.clone(), runs, merge, list, inputs: Vec::new() })
     }
 
-    /// The command with the options that define the runs.
+    /// Formats the command with the options that define the runs.
     fn words(&self) -> String {
         let mut words = format!("lnn sweep {}", self.file.display());
         words.extend(self.vary.iter().map(|one| format!(" --vary '{}={}'", one.key, one.values.join(","))));

@@ -36,7 +36,7 @@ pub struct Args {
     format: FormatArgs,
 }
 
-/// Degrees of families of functions.
+/// Parses the degrees of families of functions.
 ///
 /// # Errors
 /// The form that was expected.
@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (basis, _) = probe.basis(args.basis)?;
     let n = probe.model.coordinates();
     let own = unknowns(n, basis.len());
-    // For quadratic quantities, cyclic coordinates leave fewer functions than this.
+    // For quadratic quantities this is an upper bound, because cyclic coordinates reduce the number of functions.
     let second = |most: usize| if args.quadratic { own.max(quadratic_unknowns(n, basis.len()).min(most)) } else { own };
     let points = probe.points(args.points, probe.enough(second(MOST_QUADRATIC_UNKNOWNS)), second(MOST_UNKNOWNS))?;
     announce(own, points, args.quadratic);

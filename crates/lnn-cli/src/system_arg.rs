@@ -1,4 +1,4 @@
-//! The system of a command: one of the catalogue by its name, or another one by its file.
+//! The system of a command: from the catalogue by name, or from a file.
 
 use crate::files::ends_in;
 use crate::thresholds::MAX_ROBOT_BYTES;
@@ -15,7 +15,7 @@ pub fn is_file(system: &str) -> bool {
     is_robot(Path::new(system)) || ends_in(Path::new(system), &["toml"])
 }
 
-/// The system of a name, or of a file whose name ends in `.toml`, or in `.urdf` or `.xml` for a robot.
+/// Finds a system by name, or reads it from a file that ends in `.toml`, or in `.urdf` or `.xml` for a robot.
 ///
 /// # Errors
 /// A usage error for an unknown name and for a mistake in a file, a data error for a file that cannot be read.
@@ -41,7 +41,7 @@ pub fn system(system: &str) -> Result<Cow<'static, System>, CliError> {
     })
 }
 
-/// The result of `make` on the text of a robot's file.
+/// Applies `make` to the text of a robot file.
 ///
 /// # Errors
 /// A usage error with file and line, a data error for a file that cannot be read.
@@ -61,7 +61,7 @@ pub fn learned_system(header: &Header) -> Result<Cow<'static, System>, String> {
     }
 }
 
-/// Notes for a system with impacts that a model does not learn them.
+/// Prints a note that a model does not learn the impacts of a system.
 pub fn note_impacts(system: &SystemInstance<f64>) {
     let events = system.events();
     let impacts = events.iter().filter(|given| given.event.is_impact()).map(|given| format!("`{}`", given.event.name));

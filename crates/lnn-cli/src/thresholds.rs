@@ -1,8 +1,9 @@
-//! Numbers that decide or limit what the program does, in one table. None of them enters a result that the library computes.
+//! Thresholds and limits of the program in one table. They do not affect results that the library computes.
 
 use std::time::Duration;
 
-// What counts as zero, and as too little. `lnn inspect` and `lnn symmetries` state results of exact arithmetic plus rounding.
+// Thresholds below which a value counts as zero or as too small. `lnn inspect` and `lnn symmetries` report results of exact arithmetic plus
+// rounding.
 
 /// An eigenvalue below this many roundings of the largest one counts as zero: errors of an elimination grow by a few roundings for each
 /// of the at most some hundred coordinates.
@@ -17,7 +18,7 @@ pub const NARROWEST_RANGE: f64 = 1e-6;
 
 /// Largest configuration or system file.
 pub const MAX_CONFIG_BYTES: u64 = 1 << 20;
-/// Largest file of a robot, whose meshes are not in it.
+/// Largest robot file; meshes are separate files.
 pub const MAX_ROBOT_BYTES: u64 = 1 << 24;
 /// Largest result of an earlier run: its summary, its captions, its configuration with all columns.
 pub const MAX_RESULT_BYTES: u64 = 1 << 26;
@@ -26,21 +27,21 @@ pub const MAX_STATES_BYTES: u64 = 1 << 28;
 
 // Limits of work and memory.
 
-/// States evaluated together; bounds the memory whatever the length of the file.
+/// Number of states evaluated together, which bounds the memory for files of any length.
 pub const ROWS_AT_ONCE: usize = 256;
 /// Numbers of the matrices of states evaluated together: 8 MB for each matrix in double precision.
 pub const NUMBERS_AT_ONCE: usize = 1 << 20;
 /// Largest number of parameters whose derivatives are shown: those of systems, not the weights of networks.
 pub const MOST_SHOWN_PARAMETERS: usize = 256;
-/// Coordinates of a metric at most: its curvature has `n^4` components.
+/// Largest number of coordinates of a metric, whose curvature has `n^4` components.
 pub const MOST_METRIC_COORDINATES: usize = 64;
-/// Pieces of a line at most: seconds of work for a metric that is a formula.
+/// Largest number of intervals on a line: seconds of work for a metric that is a formula.
 pub const MOST_PIECES: usize = 1_000_000;
-/// Directions in which the edge of a shadow is found at most: each costs a bisection of rays.
+/// Largest number of directions in which the edge of a shadow is found; each requires a bisection of rays.
 pub const MOST_EDGES: f64 = 4096.0;
-/// Bytes of a pixel of a metric while its picture is made, about: its ray twice, its colours.
+/// Approximate memory per pixel and metric while a picture is computed: two copies of its ray, and its colours.
 pub const PIXEL_BYTES: u64 = 112;
-/// Runs of a sweep at most; each is a training.
+/// Largest number of runs in a sweep; each is a training.
 pub const MOST_RUNS: usize = 10_000;
 /// Largest number of unknown coefficients of quadratic quantities for which states are drawn: the search grows with their cube.
 pub const MOST_QUADRATIC_UNKNOWNS: usize = 1300;
@@ -51,7 +52,7 @@ pub const MOST_MISTAKES: usize = 100;
 /// Attempts to find an unused name of a temporary file; all fail only if as many copies of the process died with their files left behind.
 pub const SPOOL_ATTEMPTS: usize = 100;
 
-// Samples on which something is examined.
+// Numbers of examined states.
 
 /// States of a file, or of a motion, at which constraints and conserved quantities are examined: a few suffice, because a property that
 /// does not hold fails at almost every state.
@@ -69,16 +70,16 @@ pub const FARTHEST: f64 = 1e15;
 /// Distance of the sky of an exact metric, relative to that of the camera: the
 /// deflection beyond it is a hundredth of that beyond the camera, as it falls with the inverse distance.
 pub const SKY_OF_EXACT: f64 = 100.0;
-/// Such a distance for a learned metric, which was trained only that far.
+/// The same distance for a learned metric, which was trained only up to there.
 pub const SKY_OF_LEARNED: f64 = 2.0;
 
 // What is shown.
 
-/// Points of a curve beyond which every second one is left out: more than the pixels across a picture.
+/// Number of points above which every second point of a curve is left out: more than the pixels across a picture.
 pub const MOST_CURVE_POINTS: usize = 4000;
-/// Events that are printed; a file has all of them.
+/// Largest number of events that are printed; a file contains all of them.
 pub const SHOWN_EVENTS: usize = 20;
-/// Names of files, or differences of configurations, that one line of a message lists.
+/// Largest number of file names, or of differences, in one line of a message.
 pub const SHOWN_NAMES: usize = 4;
 /// Longest name of a system that becomes the name of a directory, in bytes; file systems allow 255.
 pub const LONGEST_NAME: usize = 100;

@@ -45,8 +45,8 @@ const PRESETS: [(&str, Preset, &str); 3] = [
 ];
 
 impl Args {
-    /// The configuration: the preset's or the model's, the file's and the options' over it, every value in range. A `saved` configuration
-    /// of a checkpoint is the base unless the arguments name another one.
+    /// Merges the configuration from the preset or the model, the file and the options, and checks every value. A `saved` configuration of
+    /// a checkpoint is the base unless the arguments name another one.
     ///
     /// # Errors
     /// Usage errors naming all mistakes, or a data error for a file that cannot be read.
@@ -67,7 +67,8 @@ impl Args {
             Some(description) => description.system().map(Cow::Owned).map_err(Unusable::Description),
             None => resolve(&name).map_err(Unusable::System),
         };
-        // A catalogue system that consists of formulas, such as one under constraints, stores them with the model, and links are expanded.
+        // A catalogue system that consists of formulas, such as one under constraints, is stored with the model, and its links are
+        // expanded.
         let description = system.as_ref().ok().and_then(|system| system.description().cloned()).or(description);
         let mut parameters = match (&start, goes_on) {
             (_, Some(saved)) => saved.parameters.clone(),
@@ -111,7 +112,7 @@ impl Args {
         Ok((config, system))
     }
 
-    /// The configuration below all layers: the preset's, in the shape of a model to start from.
+    /// The base of all layers: the preset's configuration, with the shape of a model to start from.
     fn base(&self, system: &SystemInstance<f64>, layers: &Layers, start: Option<&Start>) -> Result<Config, CliError> {
         let preset = self.preset.unwrap_or(Preset::Quick);
         let config = match structure(layers, "") {
@@ -150,7 +151,7 @@ impl Args {
         Ok(Some(NamedSystem { name: system.name.to_string(), description }))
     }
 
-    /// The configuration's system; every value is in range.
+    /// Checks every value of the configuration and returns its system.
     ///
     /// # Errors
     /// Usage errors naming all mistakes.
@@ -179,7 +180,7 @@ impl Args {
         output::print(&commented(Config::KEYS, &table, &remark))
     }
 
-    /// The system: the argument's, the file's, the model's or the checkpoint's.
+    /// Determines the system from the argument, the file, the model or the checkpoint.
     fn named(&self, layers: &Layers, start: Option<&Start>, saved: Option<&Config>) -> Result<NamedSystem, CliError> {
         let place = || self.run.config.as_deref().map_or("the configuration".to_string(), crate::input::name);
         let requested = self.requested()?;
@@ -236,7 +237,7 @@ enum Unusable {
 }
 
 impl Unusable {
-    /// The error as a mistake in a configuration.
+    /// Converts the error to a mistake in a configuration.
     fn mistake(&self) -> Mistake {
         match self {
             Self::System(error) => Mistake::new("system", error),
@@ -245,7 +246,7 @@ impl Unusable {
     }
 }
 
-/// A system with these parameters; with its defaults if there are mistakes, to which those in the parameters are added.
+/// Configures a system with these parameters; if they have mistakes, reports them and uses the defaults.
 fn instance(
     system: &Cow<'static, System>,
     parameters: &BTreeMap<String, f64>,
@@ -260,7 +261,7 @@ fn instance(
     configured.map_err(CliError::usage)
 }
 
-/// Mistakes in the parameters of a system, each of them by itself.
+/// Finds the mistakes in the parameters of a system, each separately.
 fn wrong_parameters(system: &System, parameters: &BTreeMap<String, f64>, error: &SystemError) -> Vec<Mistake> {
     let alone = parameters.iter().filter_map(|(symbol, value)| {
         let one = BTreeMap::from([(symbol.clone(), *value)]);

@@ -1,4 +1,4 @@
-//! `--tube` of `lnn rollout`: a tube around the motion that contains a share of whole motions.
+//! `--tube` of `lnn rollout`: a tube around the predicted motion that contains a given share of whole motions.
 
 use crate::config::parse;
 use crate::learned::model_file;
@@ -28,18 +28,18 @@ pub struct TubeArgs {
     tube_data: Vec<PathBuf>,
 }
 
-/// A tube around a motion that begins at a time.
+/// A tube around a motion that starts at a given time.
 pub struct MotionTube {
     tube: Tube,
     start: f64,
     coordinates: Vec<String>,
 }
 
-/// A tube in JSON.
+/// The description of a tube in JSON.
 #[derive(Debug, Serialize)]
 pub struct TubeFacts<'a> {
     share: f64,
-    /// Motions that gave the shape, and motions that gave the width.
+    /// Number of motions that determined the shape, and number that determined the width.
     motions: [usize; 2],
     /// Times ahead in s.
     times: &'a [f64],
@@ -86,7 +86,7 @@ impl TubeArgs {
         Ok(Some(MotionTube { tube, start, coordinates: coordinates.to_vec() }))
     }
 
-    /// The beginning of every motion that was not used for training and lasts this long.
+    /// Beginnings of all motions that were not used for training and last at least `seconds`.
     fn windows(&self, path: &Path, coordinates: &[String], seconds: f64) -> Result<Vec<Window>, CliError> {
         let place = model_file(path)?.with_file_name("config.toml");
         let text = read_regular(&place, MAX_RESULT_BYTES).map_err(|e| {
@@ -115,7 +115,7 @@ impl TubeArgs {
     }
 }
 
-/// The beginning of every motion of at least this length, from the first accurate state.
+/// Beginnings of all motions of at least this length, from the first accurate state.
 fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
     let n = part.recording.n();
     let estimated = part.estimated();
@@ -127,7 +127,7 @@ fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
 }
 
 impl MotionTube {
-    /// Lower and upper ends at a sample.
+    /// Lower and upper limits at a sample.
     pub fn ends<'a>(&self, t: f64, q: &'a [f64]) -> impl Iterator<Item = [f64; 2]> + use<'a> {
         let half = self.tube.half_widths(t - self.start);
         q.iter().zip(half).map(|(q, h)| [q - h, q + h])
@@ -152,7 +152,7 @@ impl MotionTube {
         }
     }
 
-    /// In words.
+    /// Describes the tube in words.
     pub fn text(&self) -> String {
         let [scaling, scored] = self.tube.motions;
         format!("tube for {} of whole motions, from {} motions\n", self.tube.share, scaling + scored)

@@ -1,4 +1,4 @@
-//! Watches of the program: progress bars and remarks on standard error, Ctrl-C.
+//! Watches of the program: progress bars and remarks on standard error, and interruption by Ctrl-C.
 
 use crate::progress::Progress as Bar;
 use crate::{CliError, interrupt, output};
@@ -7,7 +7,7 @@ use lnn::pipeline::{Event, Watch};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Work that has a bar of its own.
+/// Stage of the work, each with its own progress bar.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Stage {
     Training(usize),
@@ -23,7 +23,7 @@ pub fn watch(stop: &Arc<AtomicBool>) -> Watch {
         let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
         let mut advance = |stage: Stage, done: usize, total: usize, unit: &str| {
             if bar.as_ref().is_none_or(|(shown, _)| *shown != stage) {
-                // The old one is cleared before the new one appears.
+                // The old bar is cleared before the new one appears.
                 *bar = None;
                 *bar = Some((stage, Bar::new(total as u64, unit)));
             }

@@ -1,7 +1,5 @@
 //! Physics of a model: its functions, metric, curvature, symmetries, charges and signature, compared with those of the system that it
 //! learned. Work is limited by counts instead of time, so that every run gives the same results.
-//!
-//! The work is bounded by size, not by time, so that every run gives the same results.
 
 use crate::analysis::{
     MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error, matrices_at_rest,

@@ -47,7 +47,7 @@ struct Bounded<'p, 'a> {
 }
 
 impl Bounded<'_, '_> {
-    /// Counts an evaluation and checks the limit.
+    /// Fails after an interruption, or if a new point would exceed the limit of evaluations.
     fn admit(&self, weights: &[f64]) -> Result<(), Error> {
         if self.problem.is_known(weights) {
             Ok(())

@@ -476,9 +476,6 @@ impl<S: Scalar> Objective<S> {
 
     /// Computes loss, penalty and gradient of the states `rows` of `data`; overwrites `gradient`. The loss is the mean over the states that
     /// are not left out, the penalty the mean over all states, and the gradient is that of their sum.
-    ///
-    /// The gradient is that of `loss + penalty` of the report: the loss is the mean over the states that are not left out, the penalty that
-    /// over all states.
     pub fn step(&mut self, weights: &[S], data: &Dataset<S>, rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
         let penalty = self.penalty;
         let lambda = S::of_f64(penalty.lambda()) / S::of_f64(rows.len() as f64);

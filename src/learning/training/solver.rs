@@ -1,9 +1,6 @@
 //! Mini-batch training as an argmin solver: one iteration is one epoch, and the cost is the validation loss. argmin sees the validated
 //! parameters (averaged, if averaging is on); the solver keeps the current weights, their moments, the order of the data and the state of
 //! the random generator, which a checkpoint can store between any two steps.
-//!
-//! argmin sees the validated parameters (averaged, if averaging is on); the solver keeps the current weights, their moments, the order of
-//! the data and the random state, which a checkpoint can store between any two steps.
 
 use crate::configuration::{OnFailure, Optimizer, Phase};
 use crate::lagrangian::MechanicsError;

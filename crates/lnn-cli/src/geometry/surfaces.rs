@@ -12,11 +12,11 @@ use lnn::scalar::Scalar;
 pub struct Line<'a, S> {
     /// Names of the coordinates of the block.
     pub block: &'a [String],
-    /// Ends, `(n)` each.
+    /// Start and end, `(n)` each.
     pub ends: (&'a [S], &'a [S]),
     /// Velocity at which the mass matrix is taken, `(n)`.
     pub velocity: &'a [S],
-    /// Pieces into which the line is cut.
+    /// Number of intervals on the line.
     pub steps: usize,
 }
 
@@ -67,7 +67,7 @@ impl<S: Scalar> Line<'_, S> {
     }
 }
 
-/// The determinant at a surface in a word.
+/// Describes in a word how the determinant changes at a surface.
 fn change<S>(surface: &Surface<S>) -> &'static str {
     match surface.change {
         Change::Zero => "zero",

@@ -1,4 +1,4 @@
-//! The geometry at a point as a line of JSON, every digit.
+//! Prints the geometry at a point as a line of JSON with all digits.
 
 use crate::json;
 use lnn::geometry::{PointReport, Value};

@@ -10,10 +10,10 @@ use lnn::rollout::{Event, Occurrence};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Columns of the energies of impacts.
+/// Column names for the energies of impacts.
 const ENERGIES: [&str; 3] = ["energy_before", "energy_after", "energy_lost"];
 
-/// Refuses options that the events of a system do not go with.
+/// Rejects options that cannot be combined with the events of a system.
 ///
 /// # Errors
 /// A usage error.
@@ -27,7 +27,7 @@ pub fn check(file: Option<&Path>, charges: bool, events: &[Event<f64>]) -> Resul
     Ok(())
 }
 
-/// Times, states and, for impacts, energies; velocities of impacts are those afterwards. None for a system without events.
+/// Table of times, states and, for impacts, energies; velocities of impacts are those afterwards. `None` for a system without events.
 pub fn table(source: &MotionSource, events: &[Occurrence<f64>]) -> Option<DataTable> {
     if source.events.is_empty() {
         return None;
@@ -46,7 +46,7 @@ pub fn table(source: &MotionSource, events: &[Occurrence<f64>]) -> Option<DataTa
     Some(DataTable { header, rows: events.iter().map(row).collect() })
 }
 
-/// For a terminal.
+/// Text for a terminal.
 pub fn text(table: &DataTable) -> String {
     let count = table.rows.len();
     if count == 0 {

@@ -20,7 +20,7 @@ pub struct Texts<'a> {
     pub title: &'a str,
     /// Label of the parameter of the motion.
     pub parameter: &'a str,
-    /// Name of the energy, or of the quantity in its place.
+    /// Name of the energy, or of the quantity that replaces it.
     pub energy: &'a str,
     /// Units of coordinates and velocities.
     pub units: &'a [String],
@@ -87,7 +87,7 @@ impl MotionRecord {
         ends
     }
 
-    /// Quantities over time, one panel for each unit; a panel of zeros is left out if there are others.
+    /// Draws quantities over time, one panel for each unit; a panel of zeros is left out if there are others.
     fn picture(
         &self,
         (names, units): (&[String], &[String]),
@@ -109,7 +109,7 @@ impl MotionRecord {
     }
 }
 
-/// A text whose first letter is a capital, unless it is a formula.
+/// Capitalizes a text unless it is a formula.
 fn capitalized(text: &str) -> String {
     if text.contains(|c: char| !c.is_alphabetic()) {
         return text.to_string();
@@ -117,7 +117,7 @@ fn capitalized(text: &str) -> String {
     text.chars().take(1).flat_map(char::to_uppercase).chain(text.chars().skip(1)).collect()
 }
 
-/// Extensions of pictures; all but the first are those of pages.
+/// Extensions of picture files; all but the first belong to HTML pages.
 pub const EXTENSIONS: [&str; 3] = ["svg", "html", "htm"];
 
 #[cfg(test)]

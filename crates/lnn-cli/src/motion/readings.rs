@@ -12,8 +12,8 @@ pub struct ReadingColumns<'a> {
 }
 
 impl<'a> ReadingColumns<'a> {
-    /// Readings of a system; none for a model, or for a system without measured quantities. Accelerations do not include external forces,
-    /// so quantities with accelerations are then rejected.
+    /// Selects the measured quantities of a system; `None` for a model, or for a system without them. Accelerations do not include external
+    /// forces, so quantities with accelerations are rejected if there are any.
     ///
     /// # Errors
     /// A usage error for a formula with accelerations if the motion is `driven` from outside.

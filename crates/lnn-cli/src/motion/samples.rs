@@ -1,4 +1,4 @@
-//! The samples of a roll-out on their way to a CSV: watched, completed by further columns, and written as they come.
+//! Writes the samples of a roll-out to a CSV: records them, adds further columns, and writes them as they arrive.
 
 use super::MotionRecord;
 use super::readings::ReadingColumns;
@@ -11,7 +11,7 @@ use lnn::scalar::Scalar;
 use lnn::storage::{AtomicWriter, Disk, remove_leftovers};
 use std::path::Path;
 
-/// Columns after those of the state and the energy.
+/// Columns that follow state and energy.
 pub struct MoreColumns<'a> {
     /// The limits of a tube around the coordinates.
     pub tube: Option<MotionTube>,
@@ -21,11 +21,11 @@ pub struct MoreColumns<'a> {
 
 /// The samples of a motion.
 pub struct Samples<'a> {
-    /// The file, which takes its name when it is whole; none for standard output.
+    /// The file, which is renamed to its final name when it is complete; `None` for standard output.
     file: Option<(&'a Path, AtomicWriter<'a>)>,
-    /// Columns after the others.
+    /// Further columns.
     pub more: MoreColumns<'a>,
-    /// What is kept of the motion.
+    /// Record of the motion.
     pub watch: MotionRecord,
     /// All states, if they are needed at the end.
     pub kept: Option<Trajectory<f64>>,
@@ -51,7 +51,7 @@ impl<'a> Samples<'a> {
         Ok(samples)
     }
 
-    /// Takes the next samples.
+    /// Processes the next samples.
     ///
     /// # Errors
     /// A closed pipe, a full disk.
@@ -85,7 +85,7 @@ impl<'a> Samples<'a> {
         }
     }
 
-    /// Gives the file its name, and returns what was kept.
+    /// Renames the file to its final name, and returns the recorded data.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -97,7 +97,7 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// Begins a file, after the remains of killed writers in its directory are removed.
+/// Creates a file, after removing temporary files of killed processes from its directory.
 fn begin(path: &Path) -> Result<AtomicWriter<'_>, CliError> {
     if let Some(folder) = path.parent() {
         remove_leftovers(&Disk, if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
