@@ -17,7 +17,7 @@ impl Sums {
         Self { half, rows: VecDeque::new(), sum: vec![0.0; size], steps: 0 }
     }
 
-    /// Adds a row, or none after the last one, and passes on the sum around the row `half` rows earlier.
+    /// Adds a row, or none after the last one, and emits the sum around the row `half` rows earlier.
     fn step(&mut self, row: Option<&[f64]>, mut emit: impl FnMut(&[f64])) {
         let mut place = Vec::new();
         if let Some(row) = row {
@@ -38,7 +38,7 @@ impl Sums {
         self.steps += 1;
     }
 
-    /// Passes on the sums around the last rows, and starts over.
+    /// Emits the sums around the last rows, and starts over.
     fn finish(&mut self, mut emit: impl FnMut(&[f64])) {
         (0..self.half).for_each(|_| self.step(None, &mut emit));
         self.rows.clear();
@@ -61,21 +61,21 @@ pub(super) struct Averages<'a> {
     /// The numbers of a state, then the weights of its equations.
     row: Vec<f64>,
     mean: Vec<f64>,
-    /// Marks the equations that are not finite, from the next state that is passed on.
+    /// Marks the equations that are not finite, starting with the next state to be emitted.
     failed: VecDeque<bool>,
     /// Number of states that were processed.
     received: usize,
 }
 
 impl<'a> Averages<'a> {
-    /// For states with `n` equations of `width` numbers each.
+    /// Creates averages for states with `n` equations of `width` numbers each.
     pub fn new(states: &'a States, (n, width): (usize, usize)) -> Self {
         let size = n * (width + 1);
         let sums = [(); 2].map(|()| Sums::new(states.averaged, size));
         Self { states, n, sums, row: vec![0.0; size], mean: vec![0.0; n * width], failed: VecDeque::new(), received: 0 }
     }
 
-    /// Adds the numbers of the next state, `(n, width)`, and passes on the means of states whose windows are complete, in order.
+    /// Adds the numbers of the next state, `(n, width)`, and emits the means of states whose windows are complete, in order.
     pub fn take(&mut self, values: &[f64], mut emit: impl FnMut(&[f64])) {
         if self.states.averaged == 0 {
             return emit(values);

@@ -189,7 +189,7 @@ impl Search<'_> {
         value.is_finite().then_some(value)
     }
 
-    /// One step of Newton's method; its decrement.
+    /// Performs one step of Newton's method; returns its decrement.
     fn step(&self, pull: &[f64], weight: f64, y: &mut Vec<f64>) -> Option<f64> {
         let m = y.len();
         let off: Vec<f64> = y.iter().zip(&self.centre).map(|(y, centre)| y - centre).collect();

@@ -104,7 +104,7 @@ fn smoothed_states(problem: &Problem<'_>, smoothing: &Smoothing) -> Result<(Stat
     Ok((states, Smoothings { sharper, wider }))
 }
 
-/// Refuses states off the constraints, and unknown constants that move constraints.
+/// Rejects states off the constraints, and unknown constants that move constraints.
 fn check_constraints(
     instance: &SystemInstance<f64>,
     problem: &Problem<'_>,
@@ -129,7 +129,7 @@ struct Scales {
 }
 
 impl Scales {
-    /// The scales, and the residuals that the first weights assume.
+    /// Computes the scales, and the residuals that the first weights assume.
     fn of(states: &States, n: usize) -> (Vec<f64>, Self) {
         let spread: Vec<f64> = (0..n).map(|i| deviation(states.force.iter().skip(i).step_by(n))).collect();
         // A coordinate without a force gets the weight of the others.
@@ -180,7 +180,7 @@ fn by_coordinate(
         });
         let probability = (n as f64 * probability).min(1.0);
         let noise = quantile(&mut expected[i].clone(), 0.5).sqrt().max(least[i]);
-        // Of single equations, because neighbouring averages overlap.
+        // Computed from single equations, because neighbouring averages overlap.
         let autocorrelation = correlation(&[column(&residuals.scaled, (n, i))]).at_lag_one;
         let (coordinate, white) = (recording.coordinates[i].clone(), probability >= SIGNIFICANCE);
         let spread = scales.spread[i];
@@ -269,9 +269,9 @@ fn weighted_fit(
 
 /// Residuals of the force equations, `(states, n)`.
 struct ForceResiduals {
-    /// Those of single equations.
+    /// Residuals of single equations.
     raw: Vec<f64>,
-    /// Those of averages over neighbouring equations.
+    /// Residuals of averages over neighbouring equations.
     averages: Vec<f64>,
     /// Standard errors of single equations.
     errors: Vec<f64>,
@@ -375,7 +375,7 @@ impl Problem<'_> {
         let v: Vec<f64> = starts().flat_map(|(_, v)| v.to_vec()).collect();
         let slopes = |factor: f64| {
             let x: Vec<f64> = (0..m).map(|k| factor * (1.0 + k as f64 / m as f64)).collect();
-            // Any acceleration shows it.
+            // Linearity can be tested at any accelerations.
             Follower::new(&self.course).force_slopes(&self.parameters(&x), (&q, &v, &q)).to_vec()
         };
         let (one, other) = (slopes(1.0), slopes(1.7));

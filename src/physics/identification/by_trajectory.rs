@@ -16,7 +16,7 @@ use serde::Serialize;
 /// Constants identified from one trajectory alone.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OfTrajectory {
-    /// Its name.
+    /// Name of the trajectory.
     pub trajectory: String,
     /// The constants; empty if they cannot be identified from this trajectory.
     pub constants: Vec<Constant>,

@@ -66,7 +66,7 @@ impl Closed {
         self.matrix.resize(lanes * m * n, 0.0);
         self.drift.resize(lanes * m, 0.0);
         self.load.resize(lanes * m, 0.0);
-        // Shapes are those of the recorded program.
+        // This cannot fail, because the shapes are those of the recorded program.
         let _ = self.rows.evaluate(lanes, &[q, v], values, &mut [&mut self.matrix, &mut self.drift]);
         self.drift.iter_mut().for_each(|drift| *drift = -*drift);
         self.bordered.set((n, m), mass, &self.matrix);
@@ -129,7 +129,7 @@ impl FreePart<'_> {
         force.iter_mut().zip(self.units).for_each(|(force, unit)| *force = rounded(*force) * unit);
     }
 
-    /// The same for all states, with several numbers for every coordinate, `(states, n, numbers)`.
+    /// Projects the forces of all states, with several numbers for every coordinate, `(states, n, numbers)`.
     pub fn project_all(&self, forces: &mut [f64], numbers: usize) {
         let n = self.units.len();
         let mut column = vec![0.0; n];
@@ -199,7 +199,7 @@ impl Mover<'_> {
     }
 }
 
-/// Projects an initial state onto the constraints; one that cannot be projected stays.
+/// Projects an initial state onto the constraints; if that fails, the state is unchanged.
 fn project_start(manifold: &dyn Manifold<f64>, start: &mut [f64]) {
     let mut state = start.to_vec();
     let (q, v) = state.split_at_mut(start.len() / 2);
@@ -236,7 +236,7 @@ impl Problem<'_> {
         }
     }
 
-    /// The same for states `(q, v)`; those that cannot be projected become `NaN`.
+    /// Projects states `(q, v)` onto the constraints; those that cannot be projected become `NaN`.
     pub(super) fn project_states(&self, x: &[f64], (q, v): (&mut [f64], &mut [f64])) {
         let (n, found) = (self.course.equations.n, self.course.manifold(&self.parameters(x)));
         let Some((_, manifold)) = found else { return };
@@ -277,7 +277,7 @@ impl Problem<'_> {
         all.filter(|of| of.distance > f64::max(OBEDIENCE.0 * of.noise, OBEDIENCE.1 * of.size)).collect()
     }
 
-    /// Refuses smoothed positions that are off a constraint, unless the constraint depends on an unknown constant.
+    /// Rejects smoothed positions that are off a constraint, unless the constraint depends on an unknown constant.
     ///
     /// # Errors
     /// [`IdentifyError::OffConstraint`].
@@ -288,7 +288,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Messages about constraints from which smoothed positions are off, with the identified constants.
+    /// Creates messages about constraints that the smoothed positions do not satisfy with the identified constants.
     pub(super) fn off_constraints(&self, x: &[f64], states: (&[f64], &[f64])) -> Vec<String> {
         let message = |Distance { name, distance, noise, .. }: Distance| {
             let [distance, noise] = [distance, noise].map(|x| rounded(x, 3));
@@ -314,7 +314,7 @@ impl Problem<'_> {
     }
 }
 
-/// Moves an initial state by a step, within the constraints if there are some.
+/// Moves an initial state by a step, within the constraints if there are any.
 pub(super) fn advance(mover: Option<&Mover<'_>>, start: &mut [f64], step: &[f64]) {
     match mover {
         Some(mover) => mover.advance(start, step),

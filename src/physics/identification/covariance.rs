@@ -22,8 +22,8 @@ pub(super) struct Weighting {
 }
 
 impl Weighting {
-    /// From `E psi^2`, `E psi'` and the mean weight, if residuals beyond three standard deviations count linearly (Huber, Robust Statistics, 1981,
-    /// section 7.6); `freedom` is the share of degrees of freedom that initial states and constants leave.
+    /// Computes the effect from `E psi^2`, `E psi'` and the mean weight, if residuals beyond three standard deviations count linearly
+    /// (Huber, Robust Statistics, 1981, section 7.6); `freedom` is the share of degrees of freedom that initial states and constants leave.
     pub fn of(residuals: &[Vec<f64>], robust: bool, freedom: f64) -> Self {
         let all = || residuals.iter().flatten().copied().filter(|r| r.is_finite());
         let cut = |r: f64| if robust && r.abs() > HUBER { HUBER } else { r.abs() };
@@ -105,7 +105,7 @@ impl Root {
         let scaled: Vec<f64> =
             matrix.iter().enumerate().map(|(at, x)| over(*x, scale[at / m] * scale[at % m])).collect();
         let (mut values, mut vectors) = (vec![0.0; m], vec![0.0; m * m]);
-        // Finite by construction.
+        // This cannot fail, because the matrix is finite by construction.
         let _ = eigh(m, &scaled, &mut values, &mut vectors, &mut Workspace::new());
         let determined =
             || values.iter().zip(vectors.chunks_exact(m.max(1))).filter(|(value, _)| **value > ELIMINATED_ROUNDING);
