@@ -248,15 +248,15 @@ impl Unusable {
 
 /// Configures a system with these parameters; if they have mistakes, reports them and uses the defaults.
 fn instance(
-    system: &Cow<'static, System>,
+    system: &System,
     parameters: &BTreeMap<String, f64>,
     mistakes: &mut Vec<Mistake>,
 ) -> Result<SystemInstance<f64>, CliError> {
     let defaults = BTreeMap::new();
     let chosen = if mistakes.is_empty() { parameters } else { &defaults };
-    let configured = configure_values(system.clone(), chosen).or_else(|error| {
+    let configured = configure_values(Cow::Owned(system.clone()), chosen).or_else(|error| {
         mistakes.extend(wrong_parameters(system, parameters, &error));
-        configure_values(system.clone(), &defaults)
+        configure_values(Cow::Owned(system.clone()), &defaults)
     });
     configured.map_err(CliError::usage)
 }

@@ -89,13 +89,16 @@ impl<'a> Samples<'a> {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn finish(self) -> Result<(MotionRecord, Option<MotionTube>, Option<Trajectory<f64>>), CliError> {
+    pub fn finish(self) -> Result<Recorded, CliError> {
         if let Some((path, growing)) = self.file {
             growing.finish().map_err(|e| cannot_write(path, e))?;
         }
         Ok((self.watch, self.more.tube, self.kept))
     }
 }
+
+/// The record of a motion, its tube, and the motion itself if pictures need it.
+type Recorded = (MotionRecord, Option<MotionTube>, Option<Trajectory<f64>>);
 
 /// Creates a file, after removing temporary files of killed processes from its directory.
 fn begin(path: &Path) -> Result<AtomicWriter<'_>, CliError> {

@@ -196,9 +196,9 @@ impl KerrSchild {
         vec![v[0] - along, y * k - z * s, z * p - x * k, x * s - y * p]
     }
 
-    /// Carter's constant `K = (l.v) (Delta (l.v) - 2 Sigma r') + r^2 g(v, v)` with `l.v = t' + l_x x' + ..` and `Delta = r^2 - 2 M r + a^2
-    /// + Q^2`. It is never negative for free fall slower than light, and `(L_z - a E)^2` in the equatorial plane. Returns `None` for a
-    /// wrong number of parameters.
+    /// Carter's constant `K = (l.v) (Delta (l.v) - 2 Sigma r') + r^2 g(v, v)` with `l.v = t' + l_x x' + ..` and
+    /// `Delta = r^2 - 2 M r + a^2 + Q^2`. It is never negative for free fall slower than light, and `(L_z - a E)^2` in the equatorial plane.
+    /// Returns `None` for a wrong number of parameters.
     ///
     /// Source: Walker and Penrose, Commun. Math. Phys. 18, 265 (1970).
     pub fn carter<R: Real>(self, parameters: &[R], q: &[R], v: &[R]) -> Option<R> {
