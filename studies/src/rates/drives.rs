@@ -89,6 +89,7 @@ impl Driven {
 /// A driven system.
 fn driven(kind: &str, draw: &mut Draw) -> Driven {
     let [a, om, phi] = [draw.between(0.7, 1.3), draw.between(1.1, 1.7), draw.between(0.3, 1.2)];
+    let long = (1, 60.0);
     match kind {
         "Duffing's oscillator, one run of 60 s" => Driven {
             friction: true,
@@ -97,17 +98,17 @@ fn driven(kind: &str, draw: &mut Draw) -> Driven {
             ..Driven::new(
                 Box::new(move |t, q, v| vec![-0.2 * v[0] + a * q[0] - q[0].powi(3) + 0.4 * (om * t + phi).cos()]),
                 1,
-                (1, 60.0),
+                long,
             )
         },
-        "a pendulum with a motor, six runs of 20 s" => Driven {
+        "a pendulum with a motor, six runs of 20 s" | "a pendulum with a motor, one run of 60 s" => Driven {
             periodic: true,
             frequency: om,
             terms: &["x_dot^2", "cos(x)", "x*cos(om*t)", "x*sin(om*t)"],
             ..Driven::new(
                 Box::new(move |t, q, _| vec![-4.0 * a * q[0].sin() + 0.6 * (om * t + phi).cos()]),
                 1,
-                (6, 20.0),
+                if kind == "a pendulum with a motor, one run of 60 s" { long } else { (6, 20.0) },
             )
         },
         "two coupled oscillators, one of them driven" => Driven {
@@ -136,8 +137,9 @@ fn driven(kind: &str, draw: &mut Draw) -> Driven {
     }
 }
 
-const DRIVEN: [&str; 4] = [
+const DRIVEN: [&str; 5] = [
     "Duffing's oscillator, one run of 60 s",
+    "a pendulum with a motor, one run of 60 s",
     "a pendulum with a motor, six runs of 20 s",
     "two coupled oscillators, one of them driven",
     "a pendulum whose support shakes",
