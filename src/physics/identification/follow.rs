@@ -5,6 +5,7 @@ use super::closed::Closed;
 use crate::lagrangian::{Equations, Tangent};
 use crate::linalg::{self, Workspace};
 use crate::recording::{RecordedTrajectory, Recording};
+use crate::scalar::{update, update2};
 use crate::tape::Replay;
 use std::sync::Arc;
 
@@ -55,7 +56,7 @@ impl Course<'_> {
         let share = if after_time > before { ((t - before) / (after_time - before)).clamp(0.0, 1.0) } else { 1.0 };
         let count = values_at.len();
         self.between.weigh(times, (after, share), |at, weight| {
-            values_at.iter_mut().zip(&values[at * count..]).for_each(|(x, value)| *x += weight * value);
+            update(values_at, &values[at * count..], |x, value| *x += weight * value);
         });
     }
 }
@@ -112,9 +113,9 @@ fn add(to: &mut [f64], from: &[f64], (h, width): (&[f64], usize), slope: &[f64])
     if width == 0 {
         return;
     }
-    let lanes = to.chunks_exact_mut(width).zip(from.chunks_exact(width)).zip(slope.chunks_exact(width));
-    for (((to, from), slope), h) in lanes.zip(h) {
-        to.iter_mut().zip(from.iter().zip(slope)).for_each(|(t, (f, s))| *t = f + h * s);
+    for (lane, h) in h.iter().enumerate().take(to.len() / width) {
+        let at = lane * width..(lane + 1) * width;
+        update2(&mut to[at.clone()], &from[at.clone()], &slope[at], |to, from, slope| *to = from + h * slope);
     }
 }
 
@@ -266,9 +267,10 @@ impl<'a> Follower<'a> {
         for (lane, (block, inverse)) in blocks {
             let whole = closed.map_or(&*block, |(whole, _)| &whole[lane * k * width..][..k * width]);
             self.row.fill(0.0);
-            for (row, inverse) in self.row.chunks_exact_mut(width).zip(inverse.chunks_exact(k)) {
-                for (x, from) in inverse.iter().zip(whole.chunks_exact(width)) {
-                    row.iter_mut().zip(from).for_each(|(r, f)| *r -= x * f);
+            for (i, row) in self.row.chunks_exact_mut(width).enumerate() {
+                for j in 0..k {
+                    let x = inverse[i * k + j];
+                    update(row, &whole[j * width..][..width], |row, from| *row -= x * from);
                 }
             }
             block.copy_from_slice(&self.row);
@@ -294,13 +296,13 @@ impl<'a> Follower<'a> {
         let lanes = slopes.chunks_exact(n * width).zip(rate.v_slopes.chunks_exact_mut(n * columns));
         let states = at.q_slopes.chunks_exact(n * columns).zip(at.v_slopes.chunks_exact(n * columns));
         for ((slopes, out), (sq, sv)) in lanes.zip(states) {
-            for (row, out) in slopes.chunks_exact(width).zip(out.chunks_exact_mut(columns)) {
+            for (i, out) in out.chunks_exact_mut(columns).enumerate() {
+                let row = &slopes[i * width..][..width];
                 for j in 0..n {
-                    let (x, y) = (row[j], row[n + j]);
-                    let pairs = sq[j * columns..(j + 1) * columns].iter().zip(&sv[j * columns..(j + 1) * columns]);
-                    out.iter_mut().zip(pairs).for_each(|(o, (q, v))| *o += x * q + y * v);
+                    let (x, y, at) = (row[j], row[n + j], j * columns..(j + 1) * columns);
+                    update2(out, &sq[at.clone()], &sv[at], |out, q, v| *out += x * q + y * v);
                 }
-                out[starts..].iter_mut().zip(&row[2 * n..]).for_each(|(o, p)| *o += p);
+                update(&mut out[starts..], &row[2 * n..], |out, by_constant| *out += by_constant);
             }
         }
         rate.v = a;
@@ -482,6 +484,6 @@ pub(super) fn forces(track: &RecordedTrajectory, between: Between, (sample, x): 
     }
     between.weigh(&track.times, (sample, x), |at, weight| {
         let row = &track.force[at * n..][..n];
-        into.iter_mut().zip(row).for_each(|(f, r)| *f += weight * r);
+        update(into, row, |force, known| *force += weight * known);
     });
 }

@@ -11,6 +11,7 @@ use super::thresholds::{FAILED_SQUARE, GIVEN_WEIGHT, HUBER, LANES, RIDGE, START_
 use crate::cancellation::Cancellation;
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
+use crate::scalar::update;
 use std::f64::consts::TAU;
 
 /// A constant of a sensor: measured positions are `gain q(t - delay) + offset`.
@@ -200,7 +201,7 @@ impl<'a> Comparison<'a> {
         }
         if !self.row.is_empty() {
             let factor = gain / sigma;
-            self.row.iter_mut().zip(&slopes[at * columns..(at + 1) * columns]).for_each(|(r, q)| *r = factor * q);
+            update(&mut self.row, &slopes[at * columns..(at + 1) * columns], |row, slope| *row = factor * slope);
             for (sensor, r) in problem.sensors.iter().zip(&mut self.row[columns..]) {
                 *r = match (sensor.coordinate == i, sensor.kind) {
                     (false, _) => 0.0,

@@ -77,7 +77,7 @@ pub(crate) fn are_finite<S: Scalar>(numbers: &[S]) -> bool {
 
 /// `f(out, x)` number by number.
 #[inline(always)]
-pub(crate) fn update<S: Copy>(out: &mut [S], x: &[S], f: impl Fn(&mut S, S)) {
+pub fn update<S: Copy>(out: &mut [S], x: &[S], f: impl Fn(&mut S, S)) {
     let n = out.len().min(x.len());
     let (out, x) = (&mut out[..n], &x[..n]);
     for k in 0..n {
@@ -87,7 +87,7 @@ pub(crate) fn update<S: Copy>(out: &mut [S], x: &[S], f: impl Fn(&mut S, S)) {
 
 /// `f(out, x, y)` number by number.
 #[inline(always)]
-pub(crate) fn update2<S: Copy>(out: &mut [S], x: &[S], y: &[S], f: impl Fn(&mut S, S, S)) {
+pub fn update2<S: Copy>(out: &mut [S], x: &[S], y: &[S], f: impl Fn(&mut S, S, S)) {
     let n = out.len().min(x.len()).min(y.len());
     let (out, x, y) = (&mut out[..n], &x[..n], &y[..n]);
     for k in 0..n {

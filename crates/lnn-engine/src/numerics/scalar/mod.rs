@@ -29,9 +29,7 @@ pub(crate) use compiled::Compiled;
 pub use dd::{Dd, UnreadableNumber};
 pub(crate) use lanes::sin_cos_lane;
 pub(crate) use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
-pub(crate) use loops::{
-    Column, Simd, WithSimd, are_finite, copy_column, in_lanes, in_vectors, update, update_column, update2, update3,
-};
+pub(crate) use loops::{Column, Simd, WithSimd, are_finite, copy_column, in_lanes, in_vectors, update_column, update3};
 pub(crate) use matrix::product_by_loops;
 pub use matrix::{MatMut, MatRef, Matrices};
 
@@ -41,7 +39,7 @@ pub use {
     elementary::Elementary,
     float::{AnyFloat, Foreign},
     lanes::sin_cos_lanes,
-    loops::vectorized,
+    loops::{update, update2, vectorized},
     sum::{Dots, Sum},
 };
 
