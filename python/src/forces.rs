@@ -113,8 +113,8 @@ impl Forces {
 
 type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 
-/// Forces that give states `(b, n)` their accelerations, at times where the system depends on them, flat: generalized, friction, external, of constraints, multipliers, then the parts
-/// inertial, Coriolis and gravity; empty where there are none.
+/// Forces that give states `(b, n)` their accelerations, flat: generalized, friction, external, of constraints, multipliers, then the parts
+/// inertial, Coriolis and gravity; empty where there are none. A system that depends on the time needs the times `(b)`.
 #[pyfunction(name = "inverse_dynamics")]
 pub fn forces_of_motion<'py>(
     py: Python<'py>,

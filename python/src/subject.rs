@@ -302,7 +302,7 @@ impl Subject {
         (request, friction): (Request, bool),
         threads: usize,
     ) -> PyResult<Vec<(Terms<f64>, usize)>> {
-        if states.times.is_empty() && self.moving().is_timed() {
+        if states.times.is_empty() && !states.q.is_empty() && self.moving().is_timed() {
             return Err(value(MechanicsError::Timed));
         }
         let work = |watch: &Watch| {

@@ -50,9 +50,8 @@ def test_systems_by_name_formula_and_file(arm, tmp_path):
 
 
 def test_a_system_that_depends_on_the_time_takes_times():
-    shaken = lnn.System(
-        "x_dot^2/2 - x^2/2*(1 + e*cos(2*t))", coordinates=["x"], parameters={"e": 0.5}, forces={"x": "0.3*sin(t)"}
-    )
+    lagrangian = "x_dot^2/2 - x^2/2*(1 + e*cos(2*t))"
+    shaken = lnn.System(lagrangian=lagrangian, coordinates=["x"], parameters={"e": 0.5}, forces={"x": "0.3*sin(t)"})
     x, t = np.array([[0.5], [0.7]]), np.array([0.0, 1.3])
     a = shaken.acceleration(x, 0 * x, t=t)
     assert np.allclose(a[:, 0], -x[:, 0] * (1 + 0.5 * np.cos(2 * t)) + 0.3 * np.sin(t), rtol=1e-14)

@@ -46,8 +46,12 @@ impl CliError {
     pub fn data(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Data, message: one_line(&message.to_string()) }
     }
-    /// Creates an error for a file or standard input: wrong data, or a failure to read or write.
+    /// Creates an error for a file: wrong data, or a failure to read or write.
     pub fn file(path: &Path, problem: impl fmt::Display) -> Self {
+        Self::data(format_args!("{}: {problem}", path.display()))
+    }
+    /// Creates an error for a file that may be standard input: wrong data, or a failure to read.
+    pub fn input(path: &Path, problem: impl fmt::Display) -> Self {
         Self::data(format_args!("{}: {problem}", input::name(path)))
     }
     /// Creates an error for a signal; the message states which results were kept.

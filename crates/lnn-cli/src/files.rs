@@ -69,7 +69,7 @@ impl<'a> OutputFile<'a> {
     /// # Errors
     /// A usage error for another name than `*.toml` or `-`.
     pub fn claim_system(path: &'a Path, inputs: &[&Path], overwrite: bool) -> Result<Self, CliError> {
-        if !is_standard(path) && path.extension().is_none_or(|end| end != "toml") {
+        if !is_standard(path) && !ends_in(path, &["toml"]) {
             return Err(CliError::usage(format_args!("--out {}: expected a name that ends in .toml", path.display())));
         }
         Self::claim(path, inputs, overwrite)

@@ -65,7 +65,7 @@ pub fn report_failures(file: &Path, failures: &[(usize, String)]) -> Result<(), 
         0 => String::new(),
         count => format!(" (and {})", pluralize(count, "more row", "more rows")),
     };
-    Err(CliError::file(file, format_args!("row {row}: {problem}{more}")))
+    Err(CliError::input(file, format_args!("row {row}: {problem}{more}")))
 }
 
 /// Explains an error without the row in the batch, which means nothing to a user.

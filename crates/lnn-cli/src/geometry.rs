@@ -123,7 +123,7 @@ fn print_points<S: Scalar>(
 ) -> Result<(), CliError> {
     let n = names.len();
     let bytes = input::read(file, MAX_STATES_BYTES)?;
-    let Table { values, rows } = parse_table::<S>(&bytes, names).map_err(|e| CliError::file(file, e))?;
+    let Table { values, rows } = parse_table::<S>(&bytes, names).map_err(|e| CliError::input(file, e))?;
     drop(bytes);
     note_velocity(model, &values[..n], velocity);
     let chunk = at_once(n).min(ROWS_AT_ONCE);

@@ -21,7 +21,7 @@ pub fn name(path: &Path) -> String {
 /// A data error that names the file.
 pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, CliError> {
     let bytes = if is_standard(path) { bounded(std::io::stdin().lock(), limit) } else { read_regular(path, limit) };
-    bytes.map_err(|error| CliError::file(path, error))
+    bytes.map_err(|error| CliError::input(path, error))
 }
 
 /// Reads an input to its end, but at most `limit` bytes.

@@ -101,7 +101,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let bytes = input::read(file, MAX_STATES_BYTES)?;
     let time: &[String] = if source.model.is_timed() { &["t".to_string()] } else { &[] };
     let found = parse_states_at(&bytes, &source.columns, time);
-    let (states, times): (States<S>, Vec<S>) = found.map_err(|e| CliError::file(file, e))?;
+    let (states, times): (States<S>, Vec<S>) = found.map_err(|e| CliError::input(file, e))?;
     drop(bytes);
 
     let n = source.columns.len() / 2;
@@ -118,7 +118,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
             Some(t) => model.terms_at(t, q, v, Request::ALL, &mut terms),
             None => model.terms(q, v, Request::ALL, &mut terms),
         };
-        let failed = terms.drain_failures(outcome).map_err(|error| CliError::file(file, error))?;
+        let failed = terms.drain_failures(outcome).map_err(|error| CliError::input(file, error))?;
         let spectrum = spectrum(n, &terms.mass_matrix);
         let held = ConstrainedState::of(model.as_ref(), q, v, &terms);
         let squares = squares((n, v), &terms, &spectrum);

@@ -20,7 +20,7 @@ pub fn inverse<S: Scalar>(path: &Path, format: Format, source: &Source<S>, drive
     let drives = drives.collect::<Result<Vec<usize>, CliError>>()?;
     let accelerations = source.columns[..n].iter().map(|name| format!("{name}_ddot"));
     let mut columns: Vec<String> = source.columns.iter().cloned().chain(accelerations).collect();
-    let refused = |e: &dyn std::fmt::Display| CliError::file(path, e);
+    let refused = |e: &dyn std::fmt::Display| CliError::input(path, e);
     let bytes = input::read(path, MAX_STATES_BYTES)?;
     let header = column_names(&bytes).map_err(|e| refused(&e))?;
     // The time of a row is printed with its forces, unless t is a coordinate; a system may depend on it.

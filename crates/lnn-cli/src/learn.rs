@@ -5,7 +5,7 @@ use crate::learned::model_file;
 use crate::number::threads;
 use crate::output_dir::{self, Wanted};
 use crate::results::Writer;
-use crate::resume::{continuation_hint, remove_finished, with_continuation};
+use crate::resume::{continuation_hint, remove_checkpoints_of, with_continuation};
 use crate::run_args::RunArgs;
 use crate::watch::watch;
 use crate::{CliError, interrupt, output};
@@ -91,11 +91,13 @@ impl<'a> Session<'a> {
                 return Err(CliError::interrupted(format_args!("interrupted before the first epoch ended{on}")));
             }
             // Without a model, there is nothing to continue from.
-            Err(error) if is_empty(&error) => return Err(remove_finished(path).err().unwrap_or_else(|| error.into())),
-            Err(error) => return Err(with_continuation(path)(error.into())),
+            Err(error) if is_empty(&error) => {
+                return Err(remove_checkpoints_of(path).err().unwrap_or_else(|| error.into()));
+            }
+            Err(error) => return Err(with_continuation(path, error.into())),
         };
         if stop != StopReason::Interrupted {
-            remove_finished(path)?;
+            remove_checkpoints_of(path)?;
         }
         if self.args.json {
             output::print(&json)?;

@@ -3,8 +3,8 @@
 use crate::CliError;
 use crate::files::{holds_something, same_file};
 use crate::resume::{command, has_checkpoint};
-use crate::thresholds::{MAX_RESULT_BYTES, SHOWN_NAMES};
-use lnn::pipeline::{CAPTIONS, Command, LEARNED, PLAY, PipelineError, RUN};
+use crate::thresholds::SHOWN_NAMES;
+use lnn::pipeline::{CAPTIONS, Command, LEARNED, MAX_RESULT_BYTES, PLAY, PipelineError, RUN};
 use lnn::storage::{Disk, Files, read_regular};
 use serde::Deserialize;
 use std::collections::BTreeMap;

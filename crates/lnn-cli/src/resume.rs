@@ -2,9 +2,8 @@
 
 use crate::differences::differences;
 use crate::folder::Folder;
-use crate::thresholds::MAX_RESULT_BYTES;
 use crate::{CliError, Kind, config, output};
-use lnn::pipeline::Command;
+use lnn::pipeline::{Command, MAX_RESULT_BYTES};
 use lnn::storage::{Disk, read_regular};
 use lnn::training::{CheckpointError, LATEST, PREVIOUS, remove_checkpoints, saved};
 use serde::de::DeserializeOwned;
@@ -142,22 +141,19 @@ pub fn continuation_hint(directory: &Path) -> String {
 }
 
 /// Adds to an error, such as a full disk, that the checkpoint still exists.
-pub fn with_continuation(directory: &Path) -> impl Fn(CliError) -> CliError {
-    |error| {
-        if error.kind() == Kind::Data && has_checkpoint(directory) {
-            let learned = "the model so far is kept; when the cause is removed";
-            CliError::data(format_args!("{error} ({learned}, continue with: {})", command(directory)))
-        } else {
-            error
-        }
+pub fn with_continuation(directory: &Path, error: CliError) -> CliError {
+    if error.kind() != Kind::Data || !has_checkpoint(directory) {
+        return error;
     }
+    let learned = "the model so far is kept; when the cause is removed";
+    CliError::data(format_args!("{error} ({learned}, continue with: {})", command(directory)))
 }
 
-/// Removes the checkpoints of a finished training.
+/// Removes the checkpoints of a training that has finished or learned nothing.
 ///
 /// # Errors
 /// A data error naming the directory.
-pub fn remove_finished(directory: &Path) -> Result<(), CliError> {
+pub fn remove_checkpoints_of(directory: &Path) -> Result<(), CliError> {
     let cannot = |e| CliError::file(directory, format_args!("cannot remove checkpoints: {e}"));
     remove_checkpoints(&Disk, directory).map_err(cannot)
 }

@@ -163,7 +163,7 @@ impl Args {
         events::check(self.events.as_deref(), self.charges, &source.events)?;
         if self.charges && (is_driven || source.model.is_timed()) {
             return Err(CliError::usage(
-                "--charges: external forces and a dependence on time change them; leave these out",
+                "--charges: only for motion without external forces, of a system that does not depend on time",
             ));
         }
         Ok(())
@@ -199,7 +199,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let least_norm = LeastNorm(source.model.as_ref());
     let model: &dyn EulerLagrange<f64> = if args.least_norm { &least_norm } else { source.model.as_ref() };
     if args.least_norm {
-        note_open_directions(source.model.as_ref(), q, v);
+        note_open_directions(source.model.as_ref(), options.t0, q, v);
     }
     let result = integrate(model, force.as_ref(), (q, v), &options, &mut samples)?;
     if !input::is_standard(&args.out) {
@@ -321,10 +321,10 @@ impl Args {
 }
 
 /// Reports the number of directions in which the motion is not determined.
-fn note_open_directions(model: &dyn EulerLagrange<f64>, q: &[f64], v: &[f64]) {
+fn note_open_directions(model: &dyn EulerLagrange<f64>, t: f64, q: &[f64], v: &[f64]) {
     let mut terms = Terms::default();
     // Failures are reported by the motion itself.
-    let _ = model.terms(q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
+    let _ = model.terms_at(&[t], q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms);
     let open = ReducedMass::of(q.len(), &terms.mass_matrix, &terms.constraint_matrix);
     let open = open.map_or(0, |reduced| reduced.null_directions(ROUNDINGS_OF_ZERO).len());
     let directions = pluralize(open, "direction", "directions");

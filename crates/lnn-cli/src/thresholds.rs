@@ -1,14 +1,12 @@
-//! Thresholds and limits of the program in one table. They do not affect results that the library computes.
+//! Thresholds and limits of the program in one table.
 
 use std::time::Duration;
 
-// Thresholds below which a value counts as zero or as too small. `lnn inspect` and `lnn symmetries` report results of exact arithmetic plus
-// rounding.
+// Thresholds below which a value counts as zero or as too small.
 
-/// An eigenvalue below this many roundings of the largest one counts as zero: errors of an elimination grow by a few roundings for each
-/// of the at most some hundred coordinates.
+/// An eigenvalue below this many roundings of the largest one counts as zero.
 pub const ROUNDINGS_OF_ZERO: f64 = 1024.0;
-/// Times that differ by less than this share of the duration are equal: rounding of sums of steps that were written with nine digits.
+/// Times that differ by less than this share of the duration are equal.
 pub const ROUNDING_OF_TIMES: f64 = 1e-9;
 /// Least width of a range of states relative to its larger end: over a narrower range, the functions of a column cannot be distinguished
 /// from constants.
@@ -20,8 +18,6 @@ pub const NARROWEST_RANGE: f64 = 1e-6;
 pub const MAX_CONFIG_BYTES: u64 = 1 << 20;
 /// Largest robot file; meshes are separate files.
 pub const MAX_ROBOT_BYTES: u64 = 1 << 24;
-/// Largest result of an earlier run: its summary, its captions, its configuration with all columns.
-pub const MAX_RESULT_BYTES: u64 = 1 << 26;
 /// Largest file of states, about two million rows of six columns with all digits.
 pub const MAX_STATES_BYTES: u64 = 1 << 28;
 
@@ -62,13 +58,12 @@ pub const CHARGES_SEED: u64 = 0;
 
 // Ranges and defaults of light in a metric.
 
-/// Distances that a camera and the sky may have, in the unit of the coordinates: beyond all lengths in use, and their fourth powers are
-/// still numbers of double precision.
+/// Distances that a camera and the sky may have, in the unit of the coordinates: their fourth powers are still numbers of
+/// double precision.
 pub const NEAREST: f64 = 1e-12;
 /// See [`NEAREST`].
 pub const FARTHEST: f64 = 1e15;
-/// Distance of the sky of an exact metric, relative to that of the camera: the
-/// deflection beyond it is a hundredth of that beyond the camera, as it falls with the inverse distance.
+/// Distance of the sky of an exact metric, relative to that of the camera: light is hardly deflected beyond.
 pub const SKY_OF_EXACT: f64 = 100.0;
 /// The same distance for a learned metric, which was trained only up to there.
 pub const SKY_OF_LEARNED: f64 = 2.0;

@@ -8,7 +8,7 @@ use crate::pipeline::checkpoints::Begin;
 use crate::pipeline::experiment_directory::{ExperimentDirectory, LockedDirectory};
 use crate::pipeline::experiment_report::{Additions, ExperimentReport, Results, conclude};
 use crate::pipeline::thresholds::STARTS;
-use crate::pipeline::train::{RunOptions, train};
+use crate::pipeline::train::{RunOptions, train_one};
 use crate::pipeline::{Command, Event, Output, PipelineError, RECORD, Watch, from_table};
 use crate::storage::container::text_checksum;
 use crate::storage::in_order;
@@ -214,7 +214,7 @@ fn make(
     let checkpoints = Some(output.checkpoints().beginning(Begin::Either));
     let options = RunOptions { threads, starts, span, checkpoints };
     let watch = watch.remarks_alone();
-    let trained = train(&run.config, &system, &options, output, &watch);
+    let trained = train_one(&run.config, &system, &options, output, &watch);
     let judged_or_empty = matches!(
         &trained,
         Ok(_)

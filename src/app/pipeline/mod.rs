@@ -123,5 +123,5 @@ pub use {
     run_file::Command,
     start::StartModel,
     tables::from_table,
-    thresholds::RTOL,
+    thresholds::{MAX_RESULT_BYTES, RTOL},
 };

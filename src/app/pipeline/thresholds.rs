@@ -4,7 +4,7 @@ use std::time::Duration;
 
 // Verdicts of headlines and notes. They only choose words; the adjacent numbers and `lnn-studies rates --part check|formula` check them.
 
-/// Largest share of states with a wrong signature that a headline does not mention; smaller shares lie at the edge of the sampled region.
+/// Largest share of states with a wrong signature that a headline does not mention.
 pub(super) const MOST_WRONG_SIGNATURES: f64 = 0.01;
 /// Lyapunov times from which on predictions of chaotic motion are good: an error at the start has grown by a factor of e^3 = 20.
 pub(super) const GOOD_LYAPUNOV_TIMES: f64 = 3.0;
@@ -12,8 +12,7 @@ pub(super) const GOOD_LYAPUNOV_TIMES: f64 = 3.0;
 pub(super) const BAD_SHARE_OF_TIME: f64 = 0.01;
 /// Energy over the mean kinetic energy that may be lost or gained without a force or friction that explains it.
 pub(super) const UNACCOUNTED_ENERGY: f64 = 0.1;
-/// Factor by which a prediction must be better than constant velocity to count as better: medians over some tens of windows differ by
-/// about a twentieth by chance.
+/// Factor by which a prediction must be better than constant velocity to count as better.
 pub(super) const BETTER_THAN_CONSTANT_VELOCITY: f64 = 1.05;
 /// Largest mean squared error of a force over its variance at which the force is well learned.
 pub(super) const WELL_LEARNED_FORCE: f64 = 0.05;
@@ -97,7 +96,7 @@ pub(super) const CERTIFICATE_WORK: usize = 80_000_000;
 /// Largest number of boxes of a certificate.
 pub(super) const CERTIFICATE_BOXES: usize = 2000;
 /// Longest result of an earlier run that is read back, in bytes.
-pub(super) const MAX_RESULT_BYTES: u64 = 1 << 26;
+pub const MAX_RESULT_BYTES: u64 = 1 << 26;
 /// Longest `run.json` that is read, in bytes; it is a single line.
 pub(super) const MAX_RUN_BYTES: u64 = 1 << 12;
 
@@ -125,8 +124,7 @@ pub(super) const CONSTRAINT_SAMPLES: f64 = 600.0;
 pub(super) const MOST_PLANES_AND_CONSTRAINTS: (usize, usize) = (3, 7);
 /// Points of a curve of a learned function.
 pub(super) const FUNCTION_POINTS: usize = 161;
-/// Step of the differences of momenta over the range of a coordinate: near the cube root of the rounding, where the errors of rounding and
-/// of truncation are equal.
+/// Step of the differences of momenta over the range of a coordinate, large enough that rounding is far below truncation.
 pub(super) const MOMENTUM_STEP: f64 = 1e-4;
 /// Largest number of components of a matrix that are drawn.
 pub(super) const MOST_MAPS: usize = 10;

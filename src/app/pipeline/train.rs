@@ -196,6 +196,20 @@ pub fn train(
     if let Some(note) = penalty_note(config, system) {
         watch.say(Event::Note(&note));
     }
+    train_one(config, system, options, output, watch)
+}
+
+/// As [`train`], as one of many runs: without the notes that concern all of them.
+///
+/// # Errors
+/// Those of [`train`].
+pub(super) fn train_one(
+    config: &Config,
+    system: &SystemInstance<f64>,
+    options: &RunOptions,
+    output: &dyn Output,
+    watch: &Watch,
+) -> Result<TrainReport, PipelineError> {
     match config.precision {
         Precision::F32 => train_in::<f32>(config, system, options, output, watch),
         Precision::F64 => train_in::<f64>(config, system, options, output, watch),
@@ -399,7 +413,9 @@ mod tests {
             config.take_structure(Structure::BlackBox);
             config.penalty = Regularizer::LorentzianSylvester { lambda: 1.0, time: "t".to_string() };
             config.data.shell_radius = config.data.shell_radius.map(|_| radius);
-            forbidden_share(&config, &system)
+            let (share, note) = (forbidden_share(&config, &system), penalty_note(&config, &system));
+            assert_eq!(note.is_some_and(|note| note.contains("g_tt > 0")), share.is_some_and(|share| share > 0.0));
+            share
         };
         // The horizon of mass 1 is at 2.
         assert_eq!(share("schwarzschild-cartesian", [3.0, 20.0]), Some(0.0));

@@ -14,9 +14,9 @@ pub const REGULAR: f64 = 5.0;
 pub(super) const REGULAR_TIME: f64 = 50.0;
 /// Largest distance of neighbours in the numbers of the chart, over that at the start: more would leave the linear range.
 pub(super) const WIDEST_SEPARATION: f64 = 1e4;
-/// Renormalisations of a separation over a motion; more change the exponent by less than its error.
+/// Renormalisations of a separation over a motion, enough for an exponent.
 pub(super) const RENORMALISATIONS: f64 = 100.0;
-/// Smallest tolerance of the motions of an estimate: finer ones cost time, and errors grow like the separation itself.
+/// Smallest tolerance of the motions of an estimate.
 pub(super) const SEPARATION_TOLERANCE: f64 = 1e-10;
 
 // ---- Friction ----
@@ -64,11 +64,11 @@ pub(super) const LEAST_INFLUENCE: f64 = 0.1;
 pub(super) const OUTSIDE_MARGIN: f64 = 0.05;
 /// Groups of consecutive states for the jackknife, each long enough to be independent of the others.
 pub(super) const JACKKNIFE_GROUPS: usize = 20;
-/// Fewest groups: the jackknife of three has an error of 60 %.
+/// Fewest groups: a standard error from three has itself an error of a half.
 pub(super) const LEAST_GROUPS: usize = 4;
 /// Fewest states of a group.
 pub(super) const LEAST_GROUP_STATES: usize = 5;
-/// Smallest mean square of the residuals over that of the accelerations: no number is known more accurately than its digits.
+/// Smallest mean square of the residuals over that of the accelerations, against division by zero.
 pub(super) const LEAST_SQUARE_RESIDUAL: f64 = 1e-20;
 
 // ---- Changes of a model that the data may support ----

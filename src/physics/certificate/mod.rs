@@ -59,7 +59,7 @@ use std::time::Instant;
 use thresholds::MOST_COORDINATES;
 
 /// Numbers of positive and of negative eigenvalues of a mass matrix.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(into = "[usize; 2]"))]
 pub struct Signature {
     /// Positive eigenvalues.
@@ -105,14 +105,6 @@ pub struct CertificateOptions<'a> {
 impl CertificateOptions<'_> {
     /// Ten seconds on one thread, any condition number, at most 10 million boxes.
     pub fn new(signature: Signature) -> Self {
-        Self { signature, ..Self::default() }
-    }
-}
-
-impl Default for CertificateOptions<'_> {
-    /// The limits of [`CertificateOptions::new`] with the empty signature, which fits no system: set `signature` before a search.
-    fn default() -> Self {
-        let signature = Signature::default();
         Self { signature, condition: None, seconds: 10.0, boxes: 10_000_000, threads: 1, stop: None }
     }
 }

@@ -1,4 +1,4 @@
-//! Limits and settings of certificates. No verdict depends on them: they set how far and how fast a proof comes.
+//! Limits and settings of certificates. They set how far and how fast a proof comes; its rigour rests on the numerics of enclosures alone.
 
 // # Limits of work
 

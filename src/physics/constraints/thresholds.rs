@@ -31,7 +31,7 @@ pub(super) const LEAST_NEW_PART: f64 = 0.15;
 /// Share of the states at which a function that vanishes must have a part outside the span of the constraints found so far, and the smallest
 /// size of that part.
 pub(super) const NEW_FUNCTION: (f64, f64) = (0.1, 0.1);
-/// The same size for additional candidates, whose noise is larger.
+/// The same two for additional candidates, whose noise is larger.
 pub(super) const FURTHER_CANDIDATE: (f64, f64) = (0.5, LEAST_NEW_PART);
 /// Smallest part outside the span, over the largest one, at which a simpler candidate is taken first.
 pub(super) const SIMPLER_PART: f64 = 0.5;
@@ -57,12 +57,10 @@ pub(super) const ZERO_ROUNDINGS: f64 = 1024.0;
 
 /// Largest lag-1 autocorrelation of noise; above it, noise and slow motion cannot be separated.
 pub(super) const MOST_AUTOCORRELATION: f64 = 0.97;
-/// Decrease of the misfit, in units of its standard deviation, above which noise counts as correlated: white noise is called correlated in none
-/// of a hundred recordings of the study.
+/// Decrease of the misfit, in units of its standard deviation, above which noise counts as correlated.
 pub(super) const COLOURED_MISFIT: f64 = 12.0;
 /// Largest excess of the misfit over the smallest one that is not excluded. The differences at neighbouring distances share samples, so
-/// that the misfit scatters by far more than one unit: with 40 the true variance is included in 15 of 16 recordings with an autocorrelation
-/// of 0.9, with 12 in 11.
+/// that the misfit scatters by far more than one unit.
 pub(super) const ALLOWED_MISFIT: f64 = 40.0;
 /// Largest mean square of differences, relative to that at distance 1, at which the noise is visible beside the motion.
 pub(super) const MOST_MOTION_SQUARE: f64 = 40.0;

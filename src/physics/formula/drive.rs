@@ -149,7 +149,8 @@ impl Residuals {
         apart
     }
 
-    /// The line that explains most, among those that are significant or explain nearly everything.
+    /// The line that explains most, among those that are significant or explain nearly everything, if enough neighbouring frequencies show the
+    /// background.
     fn line(&self, stop: &Cancellation) -> Option<Line> {
         let [low, high] = self.band;
         let step = self.resolution[1] / FREQUENCIES_PER_RESOLUTION;
@@ -165,7 +166,7 @@ impl Residuals {
         let tests = INDEPENDENT_FREQUENCIES * (high - low) / self.resolution[1] * self.driven.len() as f64;
         let of = |k: usize| {
             let own: Vec<f64> = powers.iter().map(|powers| powers[k]).collect();
-            let (peak, frequency, power) = self.highest(k, &grid, &own)?;
+            let (peak, frequency, power) = self.highest(k, &grid, &own).filter(|_| stop.go_on())?;
             let alarms = tests * self.chance(&grid, &own, peak)?;
             let share = power / self.total;
             tracing::debug!(k, frequency, alarms, share, "line");
@@ -175,9 +176,14 @@ impl Residuals {
         lines.max_by(|a, b| a.share.total_cmp(&b.share))
     }
 
+    /// The sine and the cosine of a frequency in every window.
+    fn waves(&self, frequency: f64) -> (Vec<f64>, Vec<f64>) {
+        self.times.iter().map(|t| (frequency * t).sin_cos()).unzip()
+    }
+
     /// Reduction of the sum of squares by a drive of each kind at a frequency.
     fn powers(&self, frequency: f64) -> Vec<f64> {
-        let (sines, cosines): (Vec<f64>, Vec<f64>) = self.times.iter().map(|t| (frequency * t).sin_cos()).unzip();
+        let (sines, cosines) = self.waves(frequency);
         self.driven.iter().map(|driven| driven.power(&sines, &cosines)).collect()
     }
 
@@ -210,7 +216,10 @@ impl Residuals {
 
     /// The frequency of the largest power between two, and its power.
     fn refined(&self, k: usize, [mut low, mut high]: [f64; 2]) -> (f64, f64) {
-        let power = |om: f64| self.powers(om)[k];
+        let power = |om: f64| {
+            let (sines, cosines) = self.waves(om);
+            self.driven[k].power(&sines, &cosines)
+        };
         for _ in 0..12 {
             let [a, b] = [low + 0.382 * (high - low), low + 0.618 * (high - low)];
             if power(a) > power(b) { high = b } else { low = a }

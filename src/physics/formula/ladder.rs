@@ -159,7 +159,7 @@ impl<'a> Ladder<'a> {
         Ok(())
     }
 
-    /// Searches the libraries again with a drive, at each significant frequency in the residuals of any of them: one library may hide a line
+    /// Searches the libraries again with a drive, at the frequencies of lines in the residuals of any of them: one library may hide a line
     /// that another one shows.
     fn drive(&mut self) -> Result<(), FormulaError> {
         let Some(name) = drive_name(&self.data.recording.coordinates) else { return Ok(()) };
@@ -176,7 +176,7 @@ impl<'a> Ladder<'a> {
             let families = extent.families;
             let extent = Extent { drive: Some(Drive { name: name.to_string(), frequency }), ..extent.clone() };
             let Some(weak) = self.weak_form(&extent)? else { continue };
-            // The error that is left of the frequency hides the differences between libraries.
+            // The remaining error of the frequency hides the differences between libraries.
             if weak.least() > DRIVEN_LIBRARY_ERROR * least {
                 continue;
             }

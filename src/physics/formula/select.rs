@@ -251,7 +251,8 @@ impl Search<'_> {
         coefficients
     }
 
-    /// Removes a tenth of the terms at a time by their first-order costs, while there are many; appends them to `order`.
+    /// Removes at most a tenth of the terms at a time, those of the smallest costs at fixed mass matrices, while there are many; appends them to
+    /// `order`.
     fn remove_many(&self, set: &mut Vec<usize>, coefficients: &mut Vec<f64>, order: &mut Vec<usize>) {
         while set.len() > MOST_JUDGED_REMOVALS && self.cancellation.go_on() {
             let normal = self.windows.normal(coefficients, set, self.sigma, &self.training);

@@ -38,7 +38,7 @@ pub(super) const LEAST_MODEL_STATES: usize = 20;
 
 /// Smallest number of periods in the longest trajectory: fewer do not show that a force is periodic.
 pub(super) const LEAST_DRIVE_PERIODS: f64 = 3.0;
-/// Largest expected number of false alarms, over all frequencies that are searched together: one recording in a thousand.
+/// Largest expected number of false alarms in one spectrum, over all its frequencies together.
 pub(super) const MOST_FALSE_ALARMS: f64 = 1e-3;
 /// Independent frequencies per unit of the resolution, over which a maximum is taken: neighbours within a third of a unit are correlated.
 pub(super) const INDEPENDENT_FREQUENCIES: f64 = 3.0;
@@ -53,18 +53,19 @@ pub(super) const MOST_PERIOD_DIFFERENCE: f64 = 0.02;
 pub(super) const MOST_REPEATED_PERIODS: usize = 4;
 /// Smallest number of samples that a comparison with a later period needs.
 pub(super) const LEAST_COMPARED_SAMPLES: f64 = 10.0;
-/// Largest number of terms of a law with a drive, whose frequency is fitted too: for two nearly linear coordinates outside the libraries, 24 terms
-/// fitted one recording in ten; laws with a drive in the same study have up to 7.
+/// Largest number of terms of a law with a drive, whose frequency is fitted too: with many more, a formula follows the motion of another law as
+/// well. The laws of the study have up to 7.
 pub(super) const MOST_DRIVEN_TERMS: usize = 12;
 
 // # Verdicts on recordings
 
 /// Size of an outlier or a jump above which it does not belong to the motion, over the range of all but one sample in fifty.
 pub(super) const WILD_DEVIATION: f64 = 0.25;
-/// Ratio of the noise of a trajectory to that of all at which it gets its own: more than three standard errors of
+/// Ratio of the noise of a trajectory to that of all at which it gets its own: two to three standard errors of
 /// [`LEAST_OWN_NOISE_SAMPLES`] samples.
 pub(super) const OWN_NOISE_RATIO: f64 = 1.25;
-/// Smallest number of samples at which a trajectory may have its own noise: it is then known to about 6 %.
+/// Smallest number of samples at which a trajectory may have its own noise: it is then known to 8 to 11 %, depending
+/// on the order of the differences it is estimated from.
 pub(super) const LEAST_OWN_NOISE_SAMPLES: usize = 200;
 /// Smallest number of consecutive samples.
 pub(super) const LEAST_SAMPLES: usize = 20;
@@ -190,8 +191,8 @@ pub(super) const MOST_FREQUENCIES: f64 = 50_000.0;
 /// multiple of each.
 pub(super) const REFINED_PEAKS: usize = 4;
 /// Smallest share of the squared residuals that a drive explains if it is tried although neighbouring frequencies explain the residuals as
-/// well. That is so where the motion settles within a few periods, and a library explains all but the beginning. For such recordings of
-/// Duffing's oscillator, the drive explains 0.93 to 0.999 of the residuals of the right library (`lnn-studies rates --part drives`).
+/// well. That is so where the motion settles within a few periods, and a library explains all but the beginning. The
+/// amplitude of the residuals then falls to less than a third.
 pub(super) const EXPLAINING_SHARE: f64 = 0.9;
 /// Largest error of accelerations of a library with a drive, over the smallest one before, at which it is fitted to the motion.
 pub(super) const DRIVEN_LIBRARY_ERROR: f64 = 2.0;

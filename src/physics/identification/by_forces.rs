@@ -17,8 +17,8 @@ use super::smoothed::{Quantity, States};
 use super::solve::{Normal, Problem};
 use super::stages::Fitted;
 use super::thresholds::{
-    AVERAGED_SHARE, COPIES, DRIFT_BLOCKS, LANES, LEAST_FORCE_RESIDUAL, LEAST_FORCE_UNIT, OUTLIER, SIGNIFICANCE,
-    SLOPE_ROUNDING, WEIGHT_CHANGE, WEIGHT_UPDATES,
+    COPIES, DRIFT_BLOCKS, LANES, LEAST_FORCE_RESIDUAL, LEAST_FORCE_UNIT, OUTLIER, SIGNIFICANCE, SLOPE_ROUNDING,
+    WEIGHT_CHANGE, WEIGHT_UPDATES, WINDOW_OVER_HALF_WIDTH,
 };
 use super::unknowns::unknowns;
 use crate::lagrangian::SystemInstance;
@@ -96,7 +96,7 @@ fn smoothed_states(problem: &Problem<'_>, smoothing: &Smoothing) -> Result<(Stat
     let wider = bootstrap::wider_smoothing(recording, smoothing);
     if wider.is_some() {
         let window: usize = smoothing.coordinates.iter().map(|chosen| chosen.quality.window).sum();
-        states.averaged = window / (AVERAGED_SHARE * problem.course.equations.n * states.stride);
+        states.averaged = window / (WINDOW_OVER_HALF_WIDTH * problem.course.equations.n * states.stride);
     }
     if states.places.is_empty() {
         return Err(IdentifyError::Lost);

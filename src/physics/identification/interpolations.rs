@@ -3,7 +3,7 @@
 use super::found::Identified;
 use super::solve::Problem;
 use super::stages::{Fitted, refit};
-use super::thresholds::{FEW_START_ROUNDS, ITERATIONS, RIVAL_DIFFERENCE, RIVAL_INCREASE};
+use super::thresholds::{EQUAL_FIT_INCREASE, FEW_START_ROUNDS, ITERATIONS, RIVAL_DIFFERENCE};
 use super::{Between, IdentifyOptions};
 
 /// Interpolations that the motion does not exclude, the best first.
@@ -43,7 +43,8 @@ pub(super) fn best_interpolation(problem: &mut Problem<'_>, fitted: Fitted, riva
     }
     let (between, fitted) = tried.swap_remove(best);
     problem.course.between = between;
-    let limit = fitted.normal.square + RIVAL_INCREASE * (fitted.normal.square / fitted.normal.count.max(1.0)).max(1.0);
+    let limit =
+        fitted.normal.square + EQUAL_FIT_INCREASE * (fitted.normal.square / fitted.normal.count.max(1.0)).max(1.0);
     let mut rivals = Rivals { interpolations: vec![between], largest_change: vec![0.0; fitted.x.len()] };
     for (between, own) in tried.iter().filter(|(_, own)| own.normal.failed == 0 && own.normal.square < limit) {
         rivals.interpolations.push(*between);

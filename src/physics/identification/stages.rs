@@ -648,7 +648,7 @@ fn lengthened(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>
         }
         let mut longer = Fitted { segments, ..fitted.clone() };
         choose_steps(problem, &longer.x, &longer.segments);
-        // Even the largest number of steps does not integrate longer segments accurately.
+        // The largest number of steps may not be enough to integrate longer segments accurately.
         if wanted.is_none() && problem.course.substeps == MOST_SUBSTEPS && fitted.substeps < MOST_SUBSTEPS {
             problem.course.substeps = fitted.substeps;
             break;

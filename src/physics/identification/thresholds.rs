@@ -10,10 +10,10 @@
 /// exactly 1; a missing term of half the noise, added in squares, gives 1.1 and is left to the test of independence.
 pub(super) const MOST_OVER_NOISE: f64 = 1.3;
 /// Significance level of the test that residuals are independent, and of the test that trajectories share a constant. Together with the two
-/// tests at [`SEGMENT_SIGNIFICANCE`], 1.5 of 100 right models are rejected.
+/// tests at [`SEGMENT_SIGNIFICANCE`], these levels reject 1.5 of 100 right models if the tests are independent.
 pub(super) const SIGNIFICANCE: f64 = 0.01;
 /// Significance level of the tests that segments share their constants and continue each other: a quarter of [`SIGNIFICANCE`] each.
-pub(super) const SEGMENT_SIGNIFICANCE: f64 = 0.0025;
+pub(super) const SEGMENT_SIGNIFICANCE: f64 = SIGNIFICANCE / 4.0;
 /// Residual over the spread of the fitted quantity above which the data cannot test a model: the noise then makes up a quarter of the variance.
 pub(super) const MOST_NOISE_SHARE: f64 = 0.5;
 /// Largest share of outliers. Noise alone makes one in 26 million samples an outlier, so that any share that can be seen has another cause.
@@ -57,7 +57,7 @@ pub(super) const FILTERED_DECREMENT: f64 = 1e-2;
 pub(super) const MOVED_DECREMENT: f64 = 1e-2;
 /// Decrease of the sum of squares, as a share of it, below which a round of fits of the initial states is the last.
 pub(super) const LEAST_START_DECREASE: f64 = 1e-4;
-/// Relative change of all weights of coordinates that ends their updates: far below the error of a standard deviation from 1,000 samples, 2 %.
+/// Relative change of all weights of coordinates that ends their updates: half the error of a standard deviation from 1,000 samples.
 pub(super) const WEIGHT_CHANGE: f64 = 0.01;
 
 // ---- What the motion determines (checked by the rows "determined" of `lnn-studies rates --part identify`) ----
@@ -66,8 +66,8 @@ pub(super) const WEIGHT_CHANGE: f64 = 0.01;
 pub(super) const NO_DEPENDENCE: f64 = 1e6;
 /// Size of an unknown that starts at 0, in standard errors with the others held fixed.
 pub(super) const SIZE_FROM_ERROR: f64 = 10.0;
-/// Share of the squared effect of an unknown that is rounding after the elimination of initial states: [`RIDGE`] times the digits that sums over
-/// some hundred samples lose.
+/// Share of the squared effect of an unknown that is rounding after the elimination of initial states, a thousand times [`RIDGE`]: sums over
+/// many samples lose digits.
 pub(super) const ELIMINATED_ROUNDING: f64 = 1e-8;
 /// Factor by which a squared effect must exceed its rounding to count as one.
 pub(super) const OVER_ROUNDING: f64 = 10.0;
@@ -81,7 +81,8 @@ pub(super) const LIKE_STARTS: f64 = 1e-8;
 pub(super) const NO_EFFECT: f64 = 1e-22;
 /// The same during the search, where a constant may be far smaller than its final value.
 pub(super) const NO_EFFECT_IN_SEARCH: f64 = 1e-26;
-/// Increase of the sum of squares, in units of the noise variance, up to which a moved motion fits equally well: three standard deviations.
+/// Increase of the sum of squares, in units of the noise variance, up to which another fit is equally good, with moved constants or with another
+/// interpolation of the forces: three standard deviations.
 pub(super) const EQUAL_FIT_INCREASE: f64 = 9.0;
 /// Factor by which constants are moved, up and down, to confirm a combination.
 pub(super) const MOVE: f64 = 2.0;
@@ -125,8 +126,6 @@ pub(super) const LEAST_FREEDOM: f64 = 0.25;
 pub(super) const LEAST_SCATTERED_SEGMENTS: usize = 8;
 /// Standard deviations by which the scatter of segments must exceed that of noise to widen errors.
 pub(super) const SCATTER_ERRORS: f64 = 2.0;
-/// Increase of the sum of squares, in units of the variance, up to which an interpolation is not excluded: three standard deviations.
-pub(super) const RIVAL_INCREASE: f64 = 9.0;
 /// Difference between interpolations, in standard errors, from which it is reported: added in squares it doubles the error, at the root of 3.
 pub(super) const RIVAL_DIFFERENCE: f64 = 1.7;
 /// Simulated copies of a recording. A standard deviation of 20 numbers has an error of 16 %, and each copy costs a fit.
@@ -135,9 +134,9 @@ pub(super) const COPIES: usize = 20;
 pub(super) const MORE_DEGREES: usize = 2;
 /// Largest distance of integrated accelerations from the positions, as a share of the spread of a coordinate, at which the copies use them.
 pub(super) const MOST_DRIFT: f64 = 0.1;
-/// Half-width of the double average of equations, as a share of a smoothing window: two thirds of a window in all. With this value, confidence
-/// intervals have their stated coverage.
-pub(super) const AVERAGED_SHARE: usize = 6;
+/// Width of a smoothing window over the half-width of the double average of equations, which so spans two thirds of a window in all. With this
+/// value, confidence intervals have their stated coverage.
+pub(super) const WINDOW_OVER_HALF_WIDTH: usize = 6;
 /// Smallest residual that is assumed, over the spread of a force.
 pub(super) const LEAST_FORCE_RESIDUAL: f64 = 1e-9;
 /// Smallest unit of a force under constraints over the largest, so that a force without errors does not outweigh all others.
@@ -189,7 +188,7 @@ pub(super) const SEGMENTS_OF_RUN: usize = 16;
 pub(super) const MOST_INCREASE: f64 = 1.5;
 /// Smallest decrease of the mean log standard error that longer or shorter segments must bring: 1 %.
 pub(super) const LEAST_ERROR_DECREASE: f64 = 0.01;
-/// Factor by which segments may be shorter than was chosen: halfway, in logarithms, to twice as long.
+/// Factor by which segments may be shorter than was chosen: between as long and half as long, since twice as long is tried too.
 pub(super) const SHORT_OF_CHOSEN: f64 = 1.5;
 /// Relative change of the sum of squares up to which a full turn of a constant changes nothing.
 pub(super) const EQUAL_SQUARES: f64 = 1e-6;
@@ -202,8 +201,8 @@ pub(super) const PHASE_RANGE: f64 = 0.5;
 pub(super) const MOST_PHASE_VALUES: usize = 40;
 /// The same after the part of the recording that is searched has doubled.
 pub(super) const DOUBLED_PHASE_VALUES: usize = 3;
-/// Smallest cosine of the angle between the derivatives by a constant before and after a small change: a phase has turned by 0.6 to 1.1 rad at
-/// the end of the recording.
+/// Smallest cosine of the angle between the derivatives by a constant before and after a small change: an angle of
+/// 0.8 rad between them.
 pub(super) const LEAST_COSINE: f64 = 0.7;
 /// Largest number of halvings of a change until it is small: down to two millionths of the range.
 pub(super) const PHASE_HALVINGS: i32 = 20;
@@ -230,7 +229,7 @@ pub(super) const SEGMENTS_BEFORE_CONSTANTS: usize = 4;
 /// Number of segments that the model must fit so that no other initial state is tried.
 pub(super) const ENOUGH_SEGMENTS: usize = 16;
 
-// ---- Limits of work (no verdict on a recording within them depends on them) ----
+// ---- Limits of work (a search that ends at a limit says so) ----
 
 /// Segments that are integrated side by side, and initial states that are tried for a segment.
 pub(super) const LANES: usize = 64;
@@ -283,7 +282,7 @@ pub(super) const FIRST_DAMPING: f64 = 1e-4;
 pub(super) const LEAST_DAMPING: f64 = 1e-10;
 /// Damping beyond which no step improves the fit.
 pub(super) const MOST_DAMPING: f64 = 1e8;
-/// Sum of squares per residual that is assumed for a segment that cannot be integrated: larger than that of any other.
+/// Sum of squares per residual that is assumed for a segment that cannot be integrated: a residual of 10,000 times the noise.
 pub(super) const FAILED_SQUARE: f64 = 1e8;
 /// The same for an equation of smoothed motion that is not finite.
 pub(super) const FAILED_EQUATION: f64 = 1e6;

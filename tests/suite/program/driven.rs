@@ -228,6 +228,34 @@ fn a_lagrangian_in_time_is_rolled_out_and_identified() {
     lnn(&["systems", "--system", &folder.file("circle.toml", circle)]).refused(2, &["rod", "itself"]);
 }
 
+#[test]
+fn the_smallest_accelerations_of_a_system_in_time_are_those_at_each_time() {
+    let folder = Folder::new();
+    let open = "name = \"open\"\nlagrangian = \"(x_dot + y_dot)^2/2 - cos(3*t)*(x + y)\"\n\
+        [[coordinates]]\nname = \"x\"\nbounds = [-1, 1]\nvelocity_bounds = [-1, 1]\n\
+        [[coordinates]]\nname = \"y\"\nbounds = [-1, 1]\nvelocity_bounds = [-1, 1]\n";
+    let system = folder.file("open.toml", open);
+    let states = folder.file("states.csv", "x,y,x_dot,y_dot,t\n0.3,0.1,0,0,0\n0.3,0.1,0,0,0.8\n");
+    let run = lnn(&["inspect", "--system", &system, "--states", &states, "--least-norm"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    for (line, t) in run.stdout.lines().zip([0.0, 0.8]) {
+        let terms: serde_json::Value = serde_json::from_str(line).unwrap();
+        for k in 0..2 {
+            let a = terms["acceleration"][k].as_f64().unwrap();
+            assert!((a + f64::cos(3.0 * t) / 2.0).abs() < 1e-12, "{line}");
+        }
+    }
+    let out = text(&folder.path("motion.csv"));
+    let [roll, end] = ["rollout --state 0.3,0.1,0,0 --t-end 1 --dt 0.1 --least-norm --rtol 1e-10 --system", "--out"];
+    let args: Vec<&str> = roll.split(' ').chain([&system[..], end, &out]).collect();
+    let run = lnn(&args);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    // x'' = -cos(3 t)/2 from rest.
+    let csv = std::fs::read_to_string(&out).unwrap();
+    let x: f64 = csv.lines().last().unwrap().split(',').nth(1).unwrap().parse().unwrap();
+    assert!((x - 0.3 - (f64::cos(3.0) - 1.0) / 18.0).abs() < 1e-7, "{x}");
+}
+
 /// A pendulum with a motor: its torque is a gain times the voltage.
 const MOTOR: &str = r#"
 name = "motor"

@@ -10,7 +10,7 @@ pub(super) const ROWS_PER_RESTART: usize = 16;
 /// [`STEPS_PER_UNEVEN_ONE`] may deviate more.
 pub(super) const EVEN_STEP: f64 = 0.5;
 pub(super) const STEPS_PER_UNEVEN_ONE: usize = 10;
-/// Step of whole numbers, in s, from which they may be milliseconds: motion is hardly ever recorded more slowly.
+/// Step of whole numbers, in s, from which they may be milliseconds; only a hint is printed.
 pub(super) const SUSPICIOUS_STEP: f64 = 5.0;
 
 // ---- Trajectories and copies ----

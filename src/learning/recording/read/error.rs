@@ -42,7 +42,7 @@ pub enum Problem {
     /// No coordinates were given; contains the columns of the file, by name or by number.
     #[error("no coordinates are given; the columns are {}", .0.join(", "))]
     Names(Vec<String>),
-    /// The file is not text; contains the position of the first such byte.
+    /// The file is not text; contains the row.
     #[error("row {0}: bytes that are not text")]
     NotText(u64),
     /// The file has a foreign format.

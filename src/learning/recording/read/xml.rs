@@ -79,8 +79,8 @@ fn local(name: &str) -> &str {
 fn unescaped(text: &str) -> String {
     let mut parts = text.split('&');
     let mut plain = parts.next().unwrap_or_default().to_string();
-    for until in parts {
-        let (escape, rest) = until.split_once(';').unwrap_or(("", until));
+    for part in parts {
+        let (escape, rest) = part.split_once(';').unwrap_or(("", part));
         let code = |digits: &str, radix| u32::from_str_radix(digits, radix).ok().and_then(char::from_u32);
         let letter = match escape {
             "lt" => Some('<'),

@@ -57,7 +57,18 @@ impl<M: EulerLagrange<S>, S: Scalar> EulerLagrange<S> for LeastNorm<M> {
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        let outcome = self.0.terms(q, v, request, terms);
+        self.terms_at(&[], q, v, request, terms)
+    }
+
+    fn terms_at(
+        &self,
+        t: &[S],
+        q: &[S],
+        v: &[S],
+        request: Request,
+        terms: &mut Terms<S>,
+    ) -> Result<(), MechanicsError> {
+        let outcome = self.0.terms_at(t, q, v, request, terms);
         if outcome.is_ok() || !request.includes(Request::ACCELERATION) {
             return outcome;
         }
