@@ -37,7 +37,7 @@ impl<S: Scalar> MotionEquations<'_, S> {
 
     /// Returns the time for an elapsed time.
     fn time(&self, elapsed: S) -> S {
-        if self.backwards() { self.options.t0 - elapsed } else { self.options.t0 + elapsed }
+        time(self.options, elapsed)
     }
 
     /// Computes the derivative of `y = (q, v)` by the elapsed time.
@@ -66,6 +66,11 @@ impl<S: Scalar> MotionEquations<'_, S> {
         }
         Ok(())
     }
+}
+
+/// Returns the time of a motion for an elapsed time.
+fn time<S: Scalar>(options: &RolloutOptions<S>, elapsed: S) -> S {
+    if options.t_end < options.t0 { options.t0 - elapsed } else { options.t0 + elapsed }
 }
 
 /// Integrates from `(q, v)` to the end of the options, or as far as possible. The arguments must be checked before.
@@ -190,18 +195,17 @@ impl<'a, S: Integrable> Progress<'a, S> {
             start: &self.state,
             samples: &samples,
         };
-        let time = |elapsed: S| if backwards { options.t0 - elapsed } else { options.t0 + elapsed };
         let mut delivery = Delivery { manifold, options, samples, on: Vec::with_capacity(2 * n), next: 0, valid: true };
         let mut sample = |k: usize, y: &[S]| delivery.deliver(k, y, keep);
         let are_nodes_wanted = nodes.is_some();
         let mut node = |e: S, weight: S, y: &[S]| {
             let weight = if backwards { -weight } else { weight };
-            nodes.iter_mut().for_each(|nodes| nodes(time(start + e), weight, &y[..n], &y[n..]));
+            nodes.iter_mut().for_each(|nodes| nodes(time(options, start + e), weight, &y[..n], &y[n..]));
         };
         let node = are_nodes_wanted.then_some(&mut node as &mut StepNodes<'_, S>);
         let (mut found, are_events_watched) = (None, watcher.is_some());
         let mut scan = |e: S, h: S, dense: &mut Dense<'_, S>| {
-            let time = |share: S| time(start + (e + share * h));
+            let time = |share: S| time(options, start + (e + share * h));
             found = watcher.as_mut()?.interruption(manifold, &time, dense);
             found.map(|(_, share)| share)
         };
