@@ -73,7 +73,7 @@ impl<S: Scalar> When<S> for GivenEvent<S> {
 /// // A ball of 1 kg falls from 1 m, and has 0.8 of its speed after each impact on the ground.
 /// let ball = ExpressionLagrangian::new(&["y"], &["g"], "y_dot^2/2 - g*y")?;
 /// let ground = Event::new("ground", |_, q: &[f64], _: &[f64]| q[0]).falling().restitution(0.8);
-/// let options = RolloutOptions { events: vec![ground], ..RolloutOptions::new(1.5, 0.01) };
+/// let options = RolloutOptions::new(1.5, 0.01).events(vec![ground]);
 /// let motion = rollout(&Mechanics::new(ball, [9.81]), &[1.0], &[0.0], &options);
 /// let fall = (2.0 / 9.81_f64).sqrt();
 /// assert!((motion.events[0].t - fall).abs() < 1e-9 && (motion.events[1].t - 2.6 * fall).abs() < 1e-9);
