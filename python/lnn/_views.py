@@ -95,8 +95,6 @@ def shadow(
         Directions in which the edge of the shadow is found; 0 omits it.
     """
     system = System(system) if isinstance(system, str) else system
-    if observer not in ("rest", "normal"):
-        raise ValueError(f"observer: expected 'rest' or 'normal', found {observer!r}")
     width = whole("width", width, 1, 2**24)
     choices = {
         "time": str(time),
@@ -104,7 +102,7 @@ def shadow(
         "distance": real("distance", distance, positive=True),
         "inclination": real("inclination", inclination),
         "azimuth": real("azimuth", azimuth),
-        "falls": observer == "normal",
+        "observer": str(observer),
         "field_of_view": real("field_of_view", field_of_view, positive=True),
         "width": width,
         "height": width if height is None else whole("height", height, 1, 2**24),

@@ -29,12 +29,11 @@ use std::sync::{Arc, Mutex};
 type Learned = (Vec<Subject>, String, String, (String, String), Option<String>);
 
 fn preset(name: &str) -> PyResult<Preset> {
-    match name {
-        "quick" => Ok(Preset::Quick),
-        "best" => Ok(Preset::Best),
-        "paper" => Ok(Preset::Paper),
-        other => Err(value(format_args!("preset: expected quick, best or paper, found {other:?}"))),
-    }
+    let known = Preset::ALL.into_iter().find(|known| known.name() == name);
+    known.ok_or_else(|| {
+        let known = Preset::ALL.map(Preset::name).join(", ");
+        value(format_args!("preset: expected one of {known}, found {name:?}"))
+    })
 }
 
 /// A value of an enumeration by its name in a configuration.

@@ -22,7 +22,7 @@ struct Choices {
     distance: f64,
     inclination: f64,
     azimuth: f64,
-    falls: bool,
+    observer: String,
     field_of_view: f64,
     width: usize,
     height: usize,
@@ -47,16 +47,21 @@ impl Choices {
         })
     }
 
-    fn camera(&self, chart: Chart) -> Camera {
-        Camera {
+    fn camera(&self, chart: Chart) -> PyResult<Camera> {
+        let observer = Observer::ALL.into_iter().find(|known| known.name() == self.observer);
+        let refused = || {
+            let known = Observer::ALL.map(Observer::name).join(" or ");
+            value(format_args!("observer: expected {known}, found {:?}", self.observer))
+        };
+        Ok(Camera {
             chart,
             azimuth: self.azimuth.to_radians(),
-            observer: if self.falls { Observer::Normal } else { Observer::Rest },
+            observer: observer.ok_or_else(refused)?,
             field_of_view: self.field_of_view.to_radians(),
             width: self.width,
             height: self.height,
             ..Camera::new(self.distance, self.inclination.to_radians())
-        }
+        })
     }
 }
 
@@ -80,7 +85,7 @@ pub fn shadow<'py>(
             other.columns, last.columns
         )));
     }
-    let camera = choices.camera(choices.chart(&last.columns[..last.columns.len() / 2])?);
+    let camera = choices.camera(choices.chart(&last.columns[..last.columns.len() / 2])?)?;
     let mut tracing = Tracing { tolerance: choices.tolerance, threads: choices.threads, ..Tracing::of(&camera) };
     let usual = if learned.is_none() { FAR * camera.distance } else { tracing.far };
     tracing.far = choices.far.unwrap_or(usual);

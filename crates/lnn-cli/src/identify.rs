@@ -1,7 +1,7 @@
 //! `lnn identify`: determines the constants of a known Lagrangian from recorded motion.
 
 use crate::files::OutputFile;
-use crate::number::{choice, one_of, positive, seconds, thread_count, threads};
+use crate::number::{choice, positive, seconds, thread_count, threads};
 use crate::recording_args::{RecordingArgs, read as read_files};
 use crate::result_page::{self, PageArgs};
 use crate::source::parameter;
@@ -46,7 +46,7 @@ pub struct Args {
     #[arg(long, value_name = "COLUMN,..", value_delimiter = ',', conflicts_with = "noise")]
     error: Vec<String>,
     /// What the constants are fitted to: the motion or the known forces [default: the forces for a chain of links, else the motion].
-    #[arg(long, value_parser = one_of(&TARGETS), value_name = "WHAT")]
+    #[arg(long, value_parser = choice(&TARGETS, Targets::name, Targets::about), value_name = "WHAT")]
     targets: Option<Targets>,
     /// Interpolation of the known forces between the samples [default: the one that fits the motion best].
     #[arg(long, value_parser = choice(&Between::ALL, Between::name, Between::about), value_name = "NAME")]
@@ -75,8 +75,7 @@ pub struct Args {
 }
 
 /// Quantities to which constants can be fitted.
-const TARGETS: [(&str, Targets, &str); 2] =
-    [("motion", Targets::Motion, "The motion"), ("forces", Targets::Forces, "Known forces")];
+const TARGETS: [Targets; 2] = [Targets::Motion, Targets::Forces];
 
 /// Makes the columns optional, because they default to the coordinates of the system.
 fn default_to_the_system(argument: clap::Arg) -> clap::Arg {

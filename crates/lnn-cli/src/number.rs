@@ -30,15 +30,6 @@ pub fn choice<T: Copy + Send + Sync>(
         .try_map(move |text| all.iter().copied().find(|&x| name(x) == text).ok_or("not named"))
 }
 
-/// A parser of one value by its name, from a table of names, values and descriptions for the help.
-pub fn one_of<T: Copy + Send + Sync>(
-    all: &'static [(&'static str, T, &'static str)],
-) -> impl TypedValueParser<Value = T> {
-    let values = all.iter().map(|&(name, _, about)| PossibleValue::new(name).help(about));
-    PossibleValuesParser::new(values)
-        .try_map(move |text| all.iter().find(|(name, ..)| *name == text).map(|(_, value, _)| *value).ok_or("not named"))
-}
-
 /// A finite decimal number.
 pub fn finite(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {

@@ -2,7 +2,7 @@
 
 use crate::files::{OutputFile, file_ending};
 use crate::learned::{Learned, model_file};
-use crate::number::{index_of, number, one_of, thread_count, threads, weight, whole};
+use crate::number::{choice, index_of, number, thread_count, threads, weight, whole};
 use crate::progress::Progress;
 use crate::source::{Source, parameter};
 use crate::thresholds::{FARTHEST, MOST_EDGES, NEAREST, PIXEL_BYTES, SKY_OF_EXACT, SKY_OF_LEARNED};
@@ -48,7 +48,7 @@ pub struct Args {
     #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = number(-360.0, 360.0))]
     azimuth: f64,
     /// Motion of the camera.
-    #[arg(long, value_parser = one_of(&OBSERVERS), value_name = "NAME", default_value = "rest")]
+    #[arg(long, value_parser = choice(&Observer::ALL, Observer::name, Observer::about), value_name = "NAME", default_value = "rest")]
     observer: Observer,
     /// Angle between the left and the right end of the picture, in degrees, 179 at most.
     #[arg(long, value_name = "DEGREES", default_value = "70", allow_hyphen_values = true, value_parser = number(1e-6, 179.0))]
@@ -82,16 +82,6 @@ pub struct Args {
     #[arg(long)]
     json: bool,
 }
-
-/// Possible motions of the camera.
-const OBSERVERS: [(&str, Observer, &str); 2] = [
-    ("rest", Observer::Rest, "At rest"),
-    (
-        "normal",
-        Observer::Normal,
-        "Along the normal of the slices of equal time; in Kerr-Schild coordinates this observer falls inwards",
-    ),
-];
 
 /// Parses the number of directions around the centre.
 fn edges(text: &str) -> Result<usize, String> {

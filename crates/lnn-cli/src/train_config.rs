@@ -2,7 +2,7 @@
 
 use crate::flags::Flags;
 use crate::layers::{Entry, Layers, Mistake};
-use crate::number::{finite, one_of};
+use crate::number::{choice, finite};
 use crate::print_config::{PrintFormat, commented, training_reference};
 use crate::run_args::{RunArgs, add_implied, fill_periods, structure};
 use crate::{CliError, output, source, system_arg};
@@ -26,7 +26,7 @@ pub struct Args {
     #[arg(required_unless_present_any = ["config", "resume", "from"])]
     system: Option<String>,
     /// A configuration that ships with the program [default: quick].
-    #[arg(long, value_parser = one_of(&PRESETS), value_name = "NAME")]
+    #[arg(long, value_parser = choice(&Preset::ALL, Preset::name, Preset::about), value_name = "NAME")]
     preset: Option<Preset>,
     /// A parameter of the system; may be repeated.
     #[arg(long, value_name = "SYMBOL=VALUE", value_parser = source::parameter)]
@@ -36,13 +36,6 @@ pub struct Args {
     #[command(flatten)]
     pub run: RunArgs,
 }
-
-/// The configurations that ship with the program.
-const PRESETS: [(&str, Preset, &str); 3] = [
-    ("quick", Preset::Quick, "A minute on two cores"),
-    ("best", Preset::Best, "Wider layers and more epochs: five minutes on two cores"),
-    ("paper", Preset::Paper, "The paper's budget and choices: hours"),
-];
 
 impl Args {
     /// Merges the configuration from the preset or the model, the file and the options, and checks every value. A `saved` configuration of
@@ -120,9 +113,11 @@ impl Args {
             None => preset.config(system),
         };
         let mut config = config.ok_or_else(|| {
-            let known = PRESETS.iter().find(|(_, known, _)| *known == preset).map_or("", |(name, ..)| name);
             let name = &system.system.name;
-            CliError::usage(format_args!("--preset {known}: {name} has no such preset, use quick or --config"))
+            CliError::usage(format_args!(
+                "--preset {}: {name} has no such preset, use quick or --config",
+                preset.name()
+            ))
         })?;
         config.parameters = all_parameters(system);
         if layers.has("network.known") {

@@ -3,21 +3,17 @@
 use super::{Figure, LinePlot, Series, figure, line_plot};
 use crate::constraints::{FoundConstraints, MotionSamples};
 use crate::lagrangian::{FormulaConstraints, Manifold, ManifoldRows};
-
-/// Largest number of constraints that are shown.
-const MOST: usize = 7;
-/// Largest number of samples that are shown.
-const SAMPLES: usize = 2000;
+use crate::report::thresholds::{SHOWN_CONSTRAINTS, SHOWN_SAMPLES};
 
 /// Distance of the motion from every constraint: `|phi|` over the length of its gradient; for a row that is linear in the velocities, `|A v
 /// - b|` over its length. Empty if no constraint was found.
 pub fn found_constraint_figures(found: &FoundConstraints, samples: &MotionSamples) -> Vec<Figure> {
     let Ok(constraints) = FormulaConstraints::new(samples.names(), found.formulas()) else { return Vec::new() };
     let Ok(manifold) = constraints.manifold::<f64>() else { return Vec::new() };
-    let names = &manifold.names()[..manifold.names().len().min(MOST)];
+    let names = &manifold.names()[..manifold.names().len().min(SHOWN_CONSTRAINTS)];
     let n = samples.n();
     let (mut distances, mut rows) = (vec![Vec::new(); names.len()], ManifoldRows::default());
-    let places = samples.places(SAMPLES);
+    let places = samples.places(SHOWN_SAMPLES);
     for &at in &places {
         let (q, v) = samples.state(at).split_at(n);
         manifold.rows(q, v, &mut rows);

@@ -7,6 +7,7 @@ use super::{
 use crate::analysis::{Portrait, TrajectoryRun, VALID, ValidTimes};
 use crate::lagrangian::SystemInstance;
 use crate::names::{number, rounded};
+use crate::report::thresholds::{BEYOND_VALID, DRAWN_COORDINATES, DRAWN_STARTS};
 use crate::rollout::Trajectory;
 use crate::scalar::Scalar;
 
@@ -82,13 +83,6 @@ pub fn training_figures(rows: &[HistoryRow]) -> Vec<Figure> {
     pictures.into_iter().filter_map(drawn).collect()
 }
 
-/// Starts that are drawn as separate lines in pictures of errors.
-const LINES: usize = 7;
-/// Largest number of coordinates with their own pictures.
-const COORDINATES: usize = 8;
-/// Time span of the picture divided by the median time of valid prediction.
-const BEYOND_VALID: f64 = 4.0;
-
 /// Times and values of one quantity of a run.
 type Part<'a, S> = &'a dyn Fn(&TrajectoryRun<S>) -> (&[f64], Vec<f64>);
 
@@ -137,7 +131,7 @@ fn over_time<S>(system: &SystemInstance<S>, y_label: &str, log_y: bool, series: 
 
 fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<S>], system: &SystemInstance<S>) {
     let some = match runs.len() {
-        count if count > LINES => format!(" The first {LINES} of {count} starts."),
+        count if count > DRAWN_STARTS => format!(" The first {DRAWN_STARTS} of {count} starts."),
         _ => String::new(),
     };
     let valid = ValidTimes::of(&runs.iter().map(|run| (run.valid, None)).collect::<Vec<_>>());
@@ -148,7 +142,7 @@ fn errors_over_time<S: Scalar>(figures: &mut Vec<Figure>, runs: &[TrajectoryRun<
             let shown = until.map_or(t.len(), |until| t.partition_point(|t| *t <= until));
             Series::new(&format!("start {}", k + 1), &t[..shown], &y[..shown.min(y.len())])
         };
-        let lines = runs.iter().take(LINES).enumerate().map(line).collect();
+        let lines = runs.iter().take(DRAWN_STARTS).enumerate().map(line).collect();
         let level = until.map(|_| Level { value: VALID, name: format!("valid up to {VALID}") });
         let plot = LinePlot { level, ..over_time(system, label, true, lines) };
         figures.extend(figure(file, heading, line_plot(&plot), format!("{caption}{some}")));
@@ -194,7 +188,7 @@ fn over_time_of<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: 
     let (coordinates, columns) = (system.system.coordinates(n), system.system.columns(n));
     let labels = system.system.labels(n);
     let shown = if system.system.time_like.is_some() { 2 * n } else { n };
-    for k in (0..shown).filter(|k| k % n < COORDINATES) {
+    for k in (0..shown).filter(|k| k % n < DRAWN_COORDINATES) {
         let (coordinate, column) = (&coordinates[k % n], &columns[k]);
         let values = pair.map(|(_, trajectory)| component(trajectory, k));
         let angle = coordinate.periodic && k < n;
@@ -253,7 +247,7 @@ fn traces<S: Scalar>(figures: &mut Vec<Figure>, portraits: &[Portrait<S>], syste
 fn phases<S: Scalar>(figures: &mut Vec<Figure>, pair: Pair<'_, S>, start: &str, system: &SystemInstance<S>) {
     let n = system.coordinates;
     let (columns, labels) = (system.system.columns(n), system.system.labels(n));
-    for (i, coordinate) in system.system.coordinates(n).iter().enumerate().take(COORDINATES) {
+    for (i, coordinate) in system.system.coordinates(n).iter().enumerate().take(DRAWN_COORDINATES) {
         let points = pair.map(|(_, trajectory)| {
             let states = component(trajectory, i).into_iter().zip(component(trajectory, n + i));
             states.collect::<Vec<(f64, f64)>>()

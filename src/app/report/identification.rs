@@ -5,13 +5,7 @@ use crate::analysis::Grid;
 use crate::formula::FoundFormula;
 use crate::identification::{Identified, ResidualPath};
 use crate::names::number;
-
-/// Largest number of coordinates with pictures.
-const COORDINATES: usize = 8;
-/// Points of a line, at most.
-const POINTS: usize = 4000;
-/// Largest lag of an autocorrelation, in samples.
-const LAGS: usize = 40;
+use crate::report::thresholds::{DRAWN_COORDINATES, DRAWN_LAGS, LINE_POINTS};
 
 /// Measured and fitted values for pictures.
 struct Fitted<'a> {
@@ -56,7 +50,7 @@ fn units(periodic: &[bool], is_force: bool) -> Vec<&'static str> {
 
 impl Fitted<'_> {
     fn figures(&self) -> impl Iterator<Item = Figure> {
-        (0..self.names.len().min(COORDINATES)).flat_map(|i| self.of(i)).flatten()
+        (0..self.names.len().min(DRAWN_COORDINATES)).flat_map(|i| self.of(i)).flatten()
     }
 
     /// Draws the pictures of coordinate `i`.
@@ -106,7 +100,7 @@ impl Fitted<'_> {
     fn residuals(&self, i: usize, unit: &str) -> LinePlot {
         let n = self.names.len();
         let samples: usize = self.paths.iter().map(|path| path.times.len()).sum();
-        let stride = samples.div_ceil(POINTS).max(1);
+        let stride = samples.div_ceil(LINE_POINTS).max(1);
         let mut points = Vec::new();
         for path in self.paths {
             points.extend(path.times.iter().copied().zip(column(&path.residuals, n, i)).step_by(stride));
@@ -120,10 +114,10 @@ impl Fitted<'_> {
 
     fn lags(&self, i: usize, what: &str) -> LinePlot {
         let n = self.names.len();
-        let (mut sums, mut counts) = (vec![0.0; LAGS + 1], vec![0.0; LAGS + 1]);
+        let (mut sums, mut counts) = (vec![0.0; DRAWN_LAGS + 1], vec![0.0; DRAWN_LAGS + 1]);
         for path in self.paths {
             let values: Vec<f64> = column(&path.residuals, n, i).collect();
-            for lag in 0..=LAGS.min(values.len().saturating_sub(1)) {
+            for lag in 0..=DRAWN_LAGS.min(values.len().saturating_sub(1)) {
                 for (a, b) in values.iter().zip(&values[lag..]).filter(|(a, b)| a.is_finite() && b.is_finite()) {
                     sums[lag] += a * b;
                     counts[lag] += 1.0;
@@ -131,7 +125,7 @@ impl Fitted<'_> {
             }
         }
         let variance = sums[0] / f64::max(counts[0], 1.0);
-        let seen: Vec<usize> = (1..=LAGS).filter(|&lag| counts[lag] > 1.0).collect();
+        let seen: Vec<usize> = (1..=DRAWN_LAGS).filter(|&lag| counts[lag] > 1.0).collect();
         let over_lags = |of: &dyn Fn(usize) -> f64| seen.iter().map(|&lag| (lag as f64, of(lag))).collect::<Vec<_>>();
         let points = over_lags(&|lag| sums[lag] / counts[lag] / variance);
         let own = Series { name: what.to_string(), points, over: false };

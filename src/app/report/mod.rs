@@ -10,6 +10,7 @@ mod page;
 mod plane;
 mod plot;
 mod table;
+mod thresholds;
 
 pub use constraints::found_constraint_figures;
 pub(crate) use evaluation::{HistoryRow, evaluation_figures, training_figures, units};

@@ -9,6 +9,7 @@ use crate::lagrangian::{
 };
 use crate::network::NetworkLagrangian;
 use crate::network::file::{Header, ModelFileError};
+use crate::report::thresholds::{COMPARED_STATES, CROSSING_SECONDS, EXAMINED_STARTS, MOST_PAGE_BYTES};
 use crate::tape::{Listing, Operation, TapeError};
 use serde_json::{Value, json};
 use thiserror::Error;
@@ -18,14 +19,6 @@ const STYLE: &str = include_str!("page/play.css");
 const ENGINE: &str = include_str!("page/engine.js");
 const PICTURES: &str = include_str!("page/pictures.js");
 const PLAY: &str = include_str!("page/play.js");
-
-/// Largest page, in bytes.
-const MOST_BYTES: usize = 500_000;
-/// Seconds in which a motion crosses the known region on screen, if the system has no unit of time.
-const SECONDS: f64 = 20.0;
-/// Number of states at which a start on the constraints is sought, and mass matrices are compared.
-const STARTS: usize = 24;
-const COMPARED: usize = 200;
 
 /// Why a page cannot be written.
 #[derive(Debug, Error)]
@@ -40,7 +33,7 @@ pub enum PageError {
     #[error(transparent)]
     System(#[from] SystemError),
     /// The page would be too large.
-    #[error("the page would have {found} bytes, {MOST_BYTES} at most are written: a smaller network has a page")]
+    #[error("the page would have {found} bytes, {MOST_PAGE_BYTES} at most are written: a smaller network has a page")]
     Large {
         /// Size of the page in bytes.
         found: usize,
@@ -82,9 +75,9 @@ pub fn page(
     let time_unit = system.map_or("s", |system| &system.system.time_unit);
     let start = start(header, system, motion.as_ref());
     let time_like = architecture.time_like.or(system.and_then(|system| system.system.time_like));
-    let t_end = system.map_or(SECONDS, |system| system.system.trajectory(n).t_end);
+    let t_end = system.map_or(CROSSING_SECONDS, |system| system.system.trajectory(n).t_end);
     let t_end = if time_unit == "s" { t_end } else { t_end.max(crossing(header, &start, time_like)) };
-    let rate = if time_unit == "s" { 1.0 } else { t_end / SECONDS };
+    let rate = if time_unit == "s" { 1.0 } else { t_end / CROSSING_SECONDS };
     let title = system.map_or(header.system.as_str(), |system| &system.system.title);
     let data = json!({
         "columns": header.columns,
@@ -92,7 +85,7 @@ pub fn page(
         "periodic": architecture.periodic,
         "time_like": time_like,
         "time_unit": if time_unit == "1" { "" } else { time_unit },
-        "span": t_end.min(SECONDS * rate),
+        "span": t_end.min(CROSSING_SECONDS * rate),
         "rate": rate,
         "start": { "q": start.0, "v": start.1 },
         "ranges": { "position": header.position, "velocity": header.velocity },
@@ -109,7 +102,7 @@ pub fn page(
     let text = PAGE.replace("{TITLE}", &escape(&format!("{title}: learned")));
     let text = text.replace("{STYLE}", STYLE).replace("{EXACT}", known).replace("{ENGINE}", ENGINE);
     let text = text.replace("{PLAY}", &[PICTURES, PLAY].concat()).replace("{DATA}", &data);
-    if text.len() > MOST_BYTES {
+    if text.len() > MOST_PAGE_BYTES {
         return Err(PageError::Large { found: text.len() });
     }
     Ok(text)
@@ -184,7 +177,7 @@ fn factors(
 ) -> Result<Option<Vec<f64>>, PageError> {
     let exact = system.build()?;
     let (positions, velocities) = (pairs(&header.position), pairs(&header.velocity));
-    let states = (1..=COMPARED).filter_map(|k| {
+    let states = (1..=COMPARED_STATES).filter_map(|k| {
         let (mut q, mut v) = (inside(&positions, 0.3, k), inside(&velocities, 0.75, k));
         motion.manifold().map_or(Ok(()), |manifold| project(manifold, &mut q, &mut v).map(drop)).ok()?;
         system.check_domain(&q).is_ok().then_some((q, v))
@@ -216,7 +209,7 @@ fn start(
     }
     let Some(manifold) = motion.manifold() else { return (q, v) };
     let known = |q: &[f64]| q.iter().zip(&header.position).all(|(q, [low, high])| (low..=high).contains(&q));
-    let tries = (1..=STARTS).filter_map(|k| {
+    let tries = (1..=EXAMINED_STARTS).filter_map(|k| {
         let (mut q, mut v) = (inside(&positions, 0.3, k), inside(&velocities, 0.75, k));
         project(manifold, &mut q, &mut v).ok().map(|_| (q, v))
     });

@@ -22,6 +22,27 @@ pub enum Preset {
 }
 
 impl Preset {
+    /// All presets.
+    pub const ALL: [Self; 3] = [Self::Quick, Self::Best, Self::Paper];
+
+    /// Returns its name in options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Quick => "quick",
+            Self::Best => "best",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// Describes it in a few words.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Quick => "A minute on two cores",
+            Self::Best => "Wider layers and more epochs: five minutes on two cores",
+            Self::Paper => "The paper's budget and choices: hours",
+        }
+    }
+
     /// The configuration of a system; `None` if the preset has none for it.
     pub fn config(self, system: &SystemInstance<f64>) -> Option<Config> {
         match self {

@@ -170,6 +170,26 @@ pub enum Targets {
 }
 
 impl Targets {
+    /// Returns its name in options and configurations.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Smoothed => "smoothed",
+            Self::Forces => "forces",
+            Self::Motion => "motion",
+        }
+    }
+
+    /// Describes it in a few words.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Measured => "Measured accelerations",
+            Self::Smoothed => "Accelerations from local polynomials",
+            Self::Forces => "Known forces",
+            Self::Motion => "The motion",
+        }
+    }
+
     /// `true` if measured accelerations are used where they exist.
     pub(crate) fn takes_measured(self) -> bool {
         matches!(self, Self::Measured | Self::Forces)
@@ -205,6 +225,13 @@ fn forces_are_noisier(recording: &Recording, smoothing: &Smoothing) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn targets_have_one_name() {
+        for targets in [Targets::Measured, Targets::Smoothed, Targets::Forces, Targets::Motion] {
+            assert_eq!(serde_json::to_string(&targets).unwrap(), format!("\"{}\"", targets.name()));
+        }
+    }
 
     #[test]
     fn rows_skip_what_was_left_out() {

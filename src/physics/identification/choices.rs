@@ -92,8 +92,7 @@ pub(super) fn fitted_quantity(
             refused("motion, because sensor constants, position errors or a segment length are given", "forces")
         }
         Some(Targets::Forces) => Ok(Quantity::Forces),
-        Some(Targets::Measured) => refused("motion or forces", "measured"),
-        Some(Targets::Smoothed) => refused("motion or forces", "smoothed"),
+        Some(other) => refused("motion or forces", other.name()),
         None if instance.system.is_chain() && driven && !needs_motion => Ok(Quantity::Forces),
         None => Ok(Quantity::Accelerations),
     }

@@ -19,6 +19,29 @@ pub enum Observer {
     Normal,
 }
 
+impl Observer {
+    /// All motions.
+    pub const ALL: [Self; 2] = [Self::Rest, Self::Normal];
+
+    /// Returns its name in options.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rest => "rest",
+            Self::Normal => "normal",
+        }
+    }
+
+    /// Describes it in a few words.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::Rest => "At rest",
+            Self::Normal => {
+                "Along the normal of the slices of equal time; in Kerr-Schild coordinates this observer falls inwards"
+            }
+        }
+    }
+}
+
 /// A camera that looks at the centre.
 ///
 /// Up is the direction of falling inclination: a hole whose spin points along `z` turns from the left towards the camera.

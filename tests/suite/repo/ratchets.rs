@@ -28,11 +28,14 @@ fn longest(lines: &[&str]) -> usize {
     (0..lines.len()).filter(|&at| starts(lines[at])).map(end).max().unwrap_or(0)
 }
 
-/// `true` for a numeric constant of a module.
+/// `true` for a numeric constant, also of several numbers, of a module or within a function.
 fn is_number(line: &str) -> bool {
-    let line = line.trim_start_matches("pub(crate) ").trim_start_matches("pub(super) ").trim_start_matches("pub ");
+    let line = line.trim_start();
+    let line = line.strip_prefix("pub").map_or(line, |line| line.split_once(' ').map_or(line, |(_, line)| line));
     let value = line.strip_prefix("const ").and_then(|line| line.split_once(": ")).map_or("", |(_, value)| value);
-    ["f64 =", "f32 =", "usize =", "u64 =", "u32 =", "i64 =", "i32 ="].iter().any(|kind| value.starts_with(kind))
+    let kind = value.split_once(" =").map_or("", |(kind, _)| kind);
+    let mut kinds = kind.split(['(', ')', '[', ']', ',', ';', ' ']).filter(|part| !part.is_empty());
+    kinds.next().is_some_and(|kind| ["f64", "f32", "usize", "u64", "u32", "i64", "i32"].contains(&kind))
 }
 
 /// What is counted.

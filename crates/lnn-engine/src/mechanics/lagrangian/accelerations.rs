@@ -4,6 +4,7 @@ use super::elimination::{Balance, eliminate};
 use super::linearization::{Linearized, Rate, SparseRows};
 use super::programs::derivatives;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::thresholds::{MOST_RECORDED_PRODUCTS, MOST_WHOLE_COORDINATES};
 use crate::linalg::SMALL_PIVOT;
 use crate::platform::OnceLock;
 use crate::scalar::{Real, Scalar, are_finite};
@@ -12,14 +13,6 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt::Debug;
 use core::sync::atomic::{AtomicBool, Ordering};
-
-/// Eliminations with at most this many products are always recorded: they take less time than a call of a solver.
-pub(super) const SMALL: usize = 60;
-
-/// Largest number of coordinates for which the whole linearization is recorded as one program. Compared with separate programs for its
-/// parts, in three runs of `cargo bench --bench hessians -- linearization`, it takes 0.4 to 0.5 times as long for two coordinates and 0.4
-/// to 1.4 times for four.
-const WHOLE: usize = 4;
 
 /// Records the equations of motion of a model for a traced state and traced parameters.
 pub(super) trait RecordMotion<S>: Debug + Send + Sync {
@@ -110,7 +103,7 @@ impl<S: Scalar> Solved<'static, S> {
 
     /// Records the accelerations of a Lagrangian from the program of its value; returns `None` if a dense solver is faster.
     pub(super) fn of_value(value: &Program<S>, parameters: &[S]) -> Option<Self> {
-        let (n, most) = (value.inputs() / 2, SMALL.max(value.lane_operations()));
+        let (n, most) = (value.inputs() / 2, MOST_RECORDED_PRODUCTS.max(value.lane_operations()));
         Self::record(Arc::new(Value(value.clone())), n, parameters, most)
     }
 }
@@ -135,7 +128,7 @@ impl<S: Scalar> RecordMotion<S> for Value<S> {
     }
 
     fn linearized_up_to(&self) -> usize {
-        WHOLE
+        MOST_WHOLE_COORDINATES
     }
 }
 

@@ -13,6 +13,7 @@ use super::{
     Inputs, Lagrangian, MechanicsError, Rayleigh, Request, Terms, WithForces, constrained_description,
     constrained_descriptions,
 };
+use crate::lagrangian::thresholds::EXAMINED_STATES;
 use crate::linalg::Workspace;
 use crate::names::unknown;
 use crate::random::RngStream;
@@ -286,10 +287,9 @@ impl<S: Scalar> SystemInstance<S> {
     }
     /// Returns states within the validation bounds, at which the constraints are examined.
     fn anywhere(&self) -> (Vec<S>, Vec<S>) {
-        const STATES: usize = 24;
         let (bounds, mut rng) = (self.system.validation(self.coordinates), RngStream::Region.generator(0));
         let mut draw = |sides: &[(f64, f64)]| -> Vec<S> {
-            let all = (0..STATES).flat_map(|_| sides.iter());
+            let all = (0..EXAMINED_STATES).flat_map(|_| sides.iter());
             all.map(|&(low, high)| S::of_f64(low + (high - low) * rng.random::<f64>())).collect()
         };
         (draw(&bounds.positions), draw(&bounds.velocities))

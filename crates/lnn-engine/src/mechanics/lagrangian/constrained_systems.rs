@@ -4,14 +4,12 @@
 use super::description::Description;
 use super::system::Range;
 use super::system::System;
+use crate::lagrangian::thresholds::{LISTED_BOBS, MOST_BOBS};
 use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
-/// Number of bobs of the longest listed chain, and of the longest supported one.
-const LISTED_BOBS: usize = 20;
-const MOST_BOBS: usize = 500;
 /// Name of a chain without the number of its bobs.
 const CHAIN: &str = "cartesian-chain-";
 

@@ -5,6 +5,7 @@ use super::error::MechanicsError;
 use super::taylor::{Space, Taylor};
 use super::{Lagrangian, Request};
 use crate::forward::{Dual, HyperDual, Jet, array};
+use crate::lagrangian::thresholds::TOGETHER_VELOCITIES;
 use crate::scalar::{Real, Scalar};
 use crate::tape::Depth;
 use alloc::vec::Vec;
@@ -218,9 +219,6 @@ impl<S: Scalar> MetricJet<S> {
     }
 }
 
-/// Largest number of velocities that vary together; beyond it, pairs of blocks of half this size are used.
-const VELOCITIES: usize = 8;
-
 /// Computes the metric jets at states `(batch, n)` of a Lagrangian that is generic over numbers.
 pub fn metric_jets<S: Scalar>(
     n: usize,
@@ -235,7 +233,7 @@ pub fn metric_jets<S: Scalar>(
         return shape("velocities", q.len(), v.len());
     }
     let groups = groups(n);
-    let mut space = Space::new(n, n.min(VELOCITIES));
+    let mut space = Space::new(n, n.min(TOGETHER_VELOCITIES));
     let jet = |(q, v): (&[S], &[S])| {
         let mut jet = MetricJet::zeros(n);
         for group in &groups {
@@ -260,11 +258,11 @@ pub fn metric_jets<S: Scalar>(
 
 /// Divides the velocities into groups such that every pair occurs in one of them.
 fn groups(n: usize) -> Vec<Vec<usize>> {
-    if n <= VELOCITIES {
+    if n <= TOGETHER_VELOCITIES {
         return vec![(0..n).collect()];
     }
     let blocks: Vec<Vec<usize>> =
-        (0..n).step_by(VELOCITIES / 2).map(|i| (i..n.min(i + VELOCITIES / 2)).collect()).collect();
+        (0..n).step_by(TOGETHER_VELOCITIES / 2).map(|i| (i..n.min(i + TOGETHER_VELOCITIES / 2)).collect()).collect();
     let pairs = (0..blocks.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
     pairs.map(|(a, b)| [blocks[b].as_slice(), &blocks[a]].concat()).collect()
 }

@@ -2,12 +2,10 @@
 
 use super::constraints::{along_rows, complement, independent_rows};
 use super::{Manifold, MechanicsError, dot};
+use crate::lagrangian::thresholds::LEAST_DRIVE_MOTION;
 use crate::linalg::{Workspace, eigh};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
-
-/// Smallest motion of the drives, relative to that of all coordinates, for which they control it.
-const LEAST_MOTION: f64 = 1e-6;
 
 /// Rejects drives, given by the indices of their coordinates, if there are fewer than degrees of freedom.
 ///
@@ -39,7 +37,7 @@ pub(super) fn driven<S: Scalar>(drives: &[usize], rows: &[S], force: &[S]) -> Op
     let (mut values, mut vectors) = (asked.clone(), gram.clone());
     eigh(d, &gram, &mut values, &mut vectors, &mut Workspace::new()).ok()?;
     let least = values.iter().fold(1.0, |least: f64, value| least.min(value.to_f64()));
-    if least < LEAST_MOTION * LEAST_MOTION {
+    if least < LEAST_DRIVE_MOTION * LEAST_DRIVE_MOTION {
         return None;
     }
     let mut found = vec![<S as Real>::zero(); n];

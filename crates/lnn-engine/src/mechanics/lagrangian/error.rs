@@ -1,6 +1,7 @@
 //! Failures of the terms of a batch: their kinds, and how they are found, merged and reported.
 
 use super::{Request, Terms};
+use crate::lagrangian::thresholds::LEAST_VECTOR_NUMBERS;
 use crate::linalg::{Failure, Workspace};
 use crate::scalar::{Scalar, vectorized};
 use alloc::vec::Vec;
@@ -234,7 +235,7 @@ fn rows_not_finite<S: Scalar>(what: &'static str, field: &[S], width: usize, fou
 /// Returns `true` if all numbers are finite; it branches only at the end.
 #[inline(always)]
 fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
-    if numbers.len() < WIDE {
+    if numbers.len() < LEAST_VECTOR_NUMBERS {
         finite(numbers)
     } else {
         vectorized(
@@ -243,9 +244,6 @@ fn all_finite<S: Scalar>(numbers: &[S]) -> bool {
         )
     }
 }
-
-/// From this many numbers on, a call of the widest vector instructions is worthwhile.
-const WIDE: usize = 64;
 
 #[inline(always)]
 fn finite<S: Scalar>(numbers: &[S]) -> bool {

@@ -5,6 +5,7 @@ use super::drives::{driven, require};
 use super::error::not_finite;
 use super::torques::recursive_forces;
 use super::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::thresholds::NEAR_CONSTRAINTS;
 use crate::linalg::Workspace;
 use crate::scalar::{Real, Scalar, update};
 use alloc::vec::Vec;
@@ -223,10 +224,6 @@ pub struct InverseDynamics<S> {
     pub multipliers: Vec<S>,
 }
 
-/// Accelerations are accepted if they violate the constraints by less than this fraction of their size, or of the size of the accelerations
-/// that the forces cause. This allows for values that a person has rounded to three digits.
-const NEAR: f64 = 1e-3;
-
 /// Computes the forces that produce the accelerations `a` at the states `(q, v)`, all `(batch, n)` in physical units. No mass matrix is
 /// inverted, so it may be singular.
 ///
@@ -423,7 +420,7 @@ impl<S: Scalar> Held<S> {
             let inertia = length(&terms.mass_matrix[row * n * n..(row + 1) * n * n]);
             let forces = size(&terms.dl_dq) + size(&terms.coriolis);
             let free = if inertia > zero { forces / inertia } else { zero };
-            if distance > S::of_f64(NEAR) * (length(a) + length(&along_rows(n, matrix, drift).0) + free) {
+            if distance > S::of_f64(NEAR_CONSTRAINTS) * (length(a) + length(&along_rows(n, matrix, drift).0) + free) {
                 let over = |c: usize| (missed[c].abs() / length(&matrix[c * n..(c + 1) * n])).to_f64();
                 let constraint = (0..m).max_by(|&b, &c| over(b).total_cmp(&over(c))).unwrap_or(0);
                 held.refused.push(MechanicsError::OffConstraints { row, constraint, distance: distance.to_f64() });

@@ -2,11 +2,9 @@
 //! changing the motion.
 
 use super::{EulerLagrange, MechanicsError, Request, Terms};
+use crate::lagrangian::thresholds::COUPLING_STATES;
 use crate::linalg::{components, dot};
 use crate::scalar::Scalar;
-
-/// Largest number of states for the detection of couplings.
-const STATES: usize = 64;
 
 /// A function that computes accelerations at states, `(states, n)` each.
 pub(crate) type Accelerations<'a, S> = &'a dyn Fn(&[S], &[S]) -> Vec<f64>;
@@ -56,7 +54,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
 /// An influence below the square root of the rounding error does not count. With constraints all coordinates form one group.
 pub fn groups<S: Scalar>(model: &dyn EulerLagrange<S>, (q, v): (&[S], &[S])) -> Vec<Vec<usize>> {
     let n = model.coordinates();
-    let used = n * STATES.min(q.len() / n.max(1));
+    let used = n * COUPLING_STATES.min(q.len() / n.max(1));
     let (q, v) = (&q[..used], &v[..used]);
     let evaluate = |q: &[S], v: &[S]| {
         let mut terms = Terms::default();

@@ -7,6 +7,7 @@ use super::taylor::Taylor;
 use super::{
     EulerLagrange, Lagrangian, MechanicsError, MetricJet, Pattern, Request, Slopes, Solved, Terms, metric_jets,
 };
+use crate::lagrangian::thresholds::{LEAST_REPLAYED_STATES, STACK_COORDINATES, WIDE_COORDINATES};
 use crate::linalg::Workspace;
 use crate::platform::{Mutex, OnceLock, lock};
 use crate::scalar::{AnyFloat, Compiled, Dd, Foreign, Real, Scalar};
@@ -15,14 +16,6 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::any::Any;
-
-/// Up to this many coordinates, a few states are evaluated with forward-mode numbers on the stack, because the interpreter has more
-/// overhead.
-const STACK_COORDINATES: usize = 2;
-/// Batches of at least this size, the lanes of a chunk, are always replayed.
-const REPLAY_FROM: usize = 8;
-/// With more coordinates, curvature is computed in the model's precision, not in a higher one.
-const WIDE_COORDINATES: usize = 4;
 
 /// A Lagrangian and the values of its parameters.
 ///
@@ -272,7 +265,7 @@ impl<S: Scalar> Evaluator<S> {
         }
         terms.clear_constraints();
         terms.make_room(n, batch, request);
-        let done = (n > STACK_COORDINATES || batch >= REPLAY_FROM)
+        let done = (n > STACK_COORDINATES || batch >= LEAST_REPLAYED_STATES)
             && (self.replay(form, (q, v), request, terms, scratch)
                 || self.sweep(form, (q, v), request, terms, scratch));
         if !done {

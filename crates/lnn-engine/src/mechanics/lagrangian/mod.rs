@@ -34,6 +34,7 @@ pub mod system;
 pub mod systems;
 mod taylor;
 mod terms;
+mod thresholds;
 mod torques;
 mod wrappers;
 

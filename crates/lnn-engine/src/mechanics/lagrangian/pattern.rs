@@ -1,5 +1,6 @@
 //! The sparsity pattern of the second derivatives of a Lagrangian: which can be nonzero, and which are constant.
 
+use crate::lagrangian::thresholds::PICTURE_ROWS;
 use crate::linalg::components;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Directions, Program, ROWS, TANGENTS, Tracer};
@@ -85,16 +86,13 @@ impl Pattern {
     }
 }
 
-/// Largest number of rows in a picture; in pictures of larger matrices a character represents several elements.
-const PICTURE: usize = 64;
-
 /// Draws the three matrices: `#` is a varying element, `=` a constant one, `.` a zero.
 impl fmt::Display for Pattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let n = self.coordinates;
         let matrices =
             [("M = d2L/dv dv", &self.mass_matrix), ("d2L/dv dq", &self.mixed), ("d2L/dq dq", &self.stiffness)];
-        let cell = n.div_ceil(PICTURE).max(1);
+        let cell = n.div_ceil(PICTURE_ROWS).max(1);
         for (name, elements) in matrices {
             let constant = elements.iter().filter(|(.., element)| *element == Element::Constant).count();
             let (count, all) = (elements.len(), n * n);

@@ -9,6 +9,7 @@
 //! consists of a viscous force, a dry one that saturates beyond the speed `k = exp(knee)`, and, for [`JointFriction::Stribeck`], an
 //! additional one near the speed `u = exp(fall)` that decreases at higher speeds. All three forces oppose the velocity.
 
+use crate::network::thresholds::{INITIAL_SPEED, INITIAL_STRENGTH};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 #[cfg(feature = "serde")]
@@ -28,11 +29,6 @@ pub enum JointFriction {
     Stribeck,
 }
 
-/// Initial parameter of the coefficients: `softplus(-3) = 0.049` of the size.
-const STRENGTH: f64 = -3.0;
-/// Initial knee and fall, as a fraction of the velocity scale.
-const SPEED: f64 = 0.05;
-
 impl JointFriction {
     /// Returns `true` if there is no joint friction.
     pub(crate) fn is_none(&self) -> bool {
@@ -41,7 +37,7 @@ impl JointFriction {
 
     /// Returns the initial parameters of `n` coordinates, row by row: `a`, `b`, the knee, then `c` and the fall.
     pub(super) fn initial(self, n: usize) -> Vec<f64> {
-        let rows = [STRENGTH, STRENGTH, SPEED.ln(), STRENGTH, SPEED.ln()];
+        let rows = [INITIAL_STRENGTH, INITIAL_STRENGTH, INITIAL_SPEED.ln(), INITIAL_STRENGTH, INITIAL_SPEED.ln()];
         rows.into_iter().take(self.rows()).flat_map(|row| vec![row; n]).collect()
     }
 

@@ -1,6 +1,7 @@
 //! Positions of the parameters of a network in its flat vector, for a sum of branches that are chains of layers; and initial weights.
 
 use crate::lagrangian::Description;
+use crate::network::thresholds::{INITIAL_FRICTION, INITIAL_TANH_SCALE, NEAR_ZERO_FACTOR};
 use crate::network::{Activation, Architecture, Initialization, InputLayer};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
@@ -203,15 +204,6 @@ fn learned(description: &Description) -> usize {
     description.parameters.values().filter(|parameter| parameter.learn).count()
 }
 
-/// Initial scale of the argument of dynamic tanh (Zhu et al. 2025).
-const DYT_ALPHA: f64 = 0.5;
-
-/// Factor of the output weights under [`Initialization::NearZero`].
-const NEAR_ZERO: f64 = 0.01;
-
-/// Initial `gamma` of every unit of a dissipation: the friction coefficient starts at `ln(1 + e^-5) = 0.0067`.
-const FRICTION: f64 = -5.0;
-
 /// Draws the flat parameters of a network; the same generator state gives the same weights in every precision.
 ///
 /// Every branch is drawn separately, with its own widths and gains; the gain of a linear layer is 1. The parameters of an input layer are
@@ -236,7 +228,7 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
             match layer.map {
                 LinearMap::Dense => {}
                 LinearMap::Diagonal => weights[layer.weight_range()].fill(<S as Real>::one()),
-                LinearMap::Scalar => weights[layer.weight_range()].fill(S::of_f64(DYT_ALPHA)),
+                LinearMap::Scalar => weights[layer.weight_range()].fill(S::of_f64(INITIAL_TANH_SCALE)),
             }
         }
     }
@@ -252,7 +244,7 @@ pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initializat
         weights[place] = S::of_f64(initial);
     }
     if let Some(dissipation) = layout.dissipation {
-        weights[dissipation.gamma_range()].fill(S::of_f64(FRICTION));
+        weights[dissipation.gamma_range()].fill(S::of_f64(INITIAL_FRICTION));
         for row in weights[dissipation.direction_range()].chunks_exact_mut(dissipation.coordinates) {
             draw_direction(rng, row);
         }
@@ -301,7 +293,7 @@ fn draw<S: Scalar>(layer: &Layer, place: Place, kind: Initialization, rng: &mut 
         (Initialization::Default | Initialization::NearZero, _) => {
             let bound = root.recip();
             let near_zero = kind == Initialization::NearZero && place == Place::Output;
-            let factor = if near_zero { NEAR_ZERO } else { 1.0 };
+            let factor = if near_zero { NEAR_ZERO_FACTOR } else { 1.0 };
             for w in layer.weight_range().chain(layer.bias_range()) {
                 weights[w] = S::of_f64(factor * rng.random_range(-bound..=bound));
             }

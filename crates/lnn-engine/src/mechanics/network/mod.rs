@@ -28,6 +28,7 @@ mod model;
 mod recorded;
 mod slopes;
 mod structure;
+mod thresholds;
 
 pub use crate::ops::Activation;
 pub use config::{ActivationChoice, Architecture, Initialization, InputLayer, UnknownActivation};

@@ -12,6 +12,7 @@
 
 use super::joint_friction::JointFriction;
 use crate::lagrangian::Description;
+use crate::network::thresholds::{BESIDE_KNOWN, INITIAL_DIAGONAL, LEAST_DIAGONAL, RECTANGLE_ROWS};
 use crate::scalar::Real;
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -83,9 +84,6 @@ impl Structure {
         }
     }
 }
-
-/// Initial factor of a constant mass matrix that is added to a known Lagrangian.
-const BESIDE_KNOWN: f64 = 0.01;
 
 /// Prior knowledge of a Lagrangian.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -288,15 +286,6 @@ pub enum Factor {
     Rectangle,
 }
 
-/// Smallest diagonal element of a triangular factor, and smallest lapse; its square is added to the eigenvalues of a rectangle.
-const LEAST: f64 = 1e-3;
-
-/// Number of rows of a rectangle for every spatial coordinate.
-const ROWS: usize = 3;
-
-/// Initial biases of the diagonal of a triangle: `softplus(1) = 1.31`.
-const DIAGONAL: f64 = 1.0;
-
 impl Factor {
     /// Returns `true` for the default in files without the key.
     fn is_triangle(&self) -> bool {
@@ -308,7 +297,7 @@ impl Factor {
         let space = n - usize::from(lorentzian);
         match self {
             Self::Triangle => n * (n + 1) / 2,
-            Self::Rectangle => ROWS * space * space + if lorentzian { n } else { 0 },
+            Self::Rectangle => RECTANGLE_ROWS * space * space + if lorentzian { n } else { 0 },
         }
     }
 
@@ -316,10 +305,10 @@ impl Factor {
     pub(super) fn initial_biases(self, n: usize, lorentzian: bool) -> Vec<(usize, f64)> {
         let space = n - usize::from(lorentzian);
         match self {
-            Self::Triangle => (0..n).map(|i| (i * (i + 1) / 2 + i, DIAGONAL)).collect(),
+            Self::Triangle => (0..n).map(|i| (i * (i + 1) / 2 + i, INITIAL_DIAGONAL)).collect(),
             Self::Rectangle => {
-                let lapse = lorentzian.then(|| (self.numbers(n, true) - 1, DIAGONAL));
-                (0..space).map(|i| (i * space + i, DIAGONAL.exp().ln_1p())).chain(lapse).collect()
+                let lapse = lorentzian.then(|| (self.numbers(n, true) - 1, INITIAL_DIAGONAL));
+                (0..space).map(|i| (i * space + i, INITIAL_DIAGONAL.exp().ln_1p())).chain(lapse).collect()
             }
         }
     }
@@ -348,7 +337,7 @@ impl Factor {
 
 /// Maps any number to a positive one.
 fn positive<R: Real>(x: R) -> R {
-    x.softplus() + R::of(LEAST)
+    x.softplus() + R::of(LEAST_DIAGONAL)
 }
 
 fn half_form_of_triangle<R: Real>(triangle: &[R], v: &[R], order: &[usize], lorentzian: bool) -> R {
@@ -367,14 +356,14 @@ fn half_form_of_triangle<R: Real>(triangle: &[R], v: &[R], order: &[usize], lore
 
 fn half_form_of_rectangle<R: Real>(numbers: &[R], v: &[R], order: &[usize], lorentzian: bool) -> R {
     let space = v.len() - usize::from(lorentzian);
-    let (rectangle, rest) = numbers.split_at(ROWS * space * space);
+    let (rectangle, rest) = numbers.split_at(RECTANGLE_ROWS * space * space);
     let moved: Vec<R> = match order[space..] {
         [time] => order[..space].iter().zip(rest).map(|(&i, &shift)| v[i] + shift * v[time]).collect(),
         _ => order.iter().map(|&i| v[i]).collect(),
     };
     let square = |sum: R, x: R| sum + x.sqr();
     let along = |row: &[R]| row.iter().zip(&moved).fold(R::zero(), |sum, (&b, &w)| sum + b * w);
-    let least = moved.iter().copied().fold(R::zero(), square) * R::of(LEAST * LEAST);
+    let least = moved.iter().copied().fold(R::zero(), square) * R::of(LEAST_DIAGONAL * LEAST_DIAGONAL);
     let form = rectangle.chunks_exact(space.max(1)).map(along).fold(least, square);
     let form = match order[space..] {
         [time] => form - (positive(rest[space]) * v[time]).sqr(),
@@ -419,12 +408,12 @@ mod tests {
     /// Checks `|B w|^2 - (N v_t)^2`, with the shift in `w`, and `10^-6 |w|^2`, for numbers computed by hand.
     #[test]
     fn a_rectangle_is_a_sum_of_squares_with_shift_and_lapse() {
-        let lapse = (2.0 - LEAST).exp_m1().ln();
+        let lapse = (2.0 - LEAST_DIAGONAL).exp_m1().ln();
         let rectangle = [1.0, 2.0, 0.0, -1.0, 3.0, 0.0, 0.0, 0.5, 0.0, 0.0, -1.0, 0.0];
         let v = [0.5, 2.0, -1.0];
         let order = time_last(3, Some(1));
         // w = (0.5 + 0.25 * 2, -1 - 0.5 * 2) = (1, -2).
-        let squares = 9.0 + 4.0 + 9.0 + 1.0 + 1.0 + LEAST * LEAST * 5.0;
+        let squares = 9.0 + 4.0 + 9.0 + 1.0 + 1.0 + LEAST_DIAGONAL * LEAST_DIAGONAL * 5.0;
         let lorentzian = [&rectangle[..], &[0.25, -0.5, lapse]].concat();
         assert_eq!(lorentzian.len(), Factor::Rectangle.numbers(3, true));
         let found: f64 = Factor::Rectangle.half_form(&lorentzian, &v, &order, true);
@@ -432,7 +421,7 @@ mod tests {
         // A single time-like coordinate.
         assert_eq!(
             Factor::Rectangle.half_form(&[lapse], &[1.0], &[0], true),
-            -0.5 * (lapse.exp().ln_1p() + LEAST).powi(2)
+            -0.5 * (lapse.exp().ln_1p() + LEAST_DIAGONAL).powi(2)
         );
         let found: f64 = Factor::Rectangle.half_form(&rectangle, &[1.0, -2.0], &[0, 1], false);
         assert!((found - squares / 2.0).abs() < 1e-13);

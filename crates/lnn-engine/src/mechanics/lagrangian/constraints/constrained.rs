@@ -7,6 +7,7 @@ use super::rows::independent;
 use super::{Constraints, Manifold, ManifoldRows, RowAdjoint};
 use crate::forward::{Dual, HyperDual};
 use crate::lagrangian::linearization::{ProgramSlopes, Rate, SlopePrograms, Sum};
+use crate::lagrangian::thresholds::REDUNDANT_ROW;
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet, Request, Slopes, Solved, Terms};
 use crate::platform::OnceLock;
 use crate::scalar::{Dd, Real, Scalar};
@@ -14,9 +15,6 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-
-/// A normalized row is redundant if its component outside the span of the previous rows is below this at every state.
-const REDUNDANT: f64 = 1e-6;
 
 /// The reason why constraints leave no motion.
 #[derive(Clone, Debug, PartialEq)]
@@ -170,7 +168,7 @@ impl<M: EulerLagrange<S>, C: Constraints, S: Scalar> Constrained<M, C, S> {
                 Ok(_) => {
                     found = true;
                     self.rows(&q, &v, &mut rows);
-                    needed.extend(independent(n, &rows.matrix, REDUNDANT).0);
+                    needed.extend(independent(n, &rows.matrix, REDUNDANT_ROW).0);
                 }
                 Err(off) => {
                     if nearest.is_none_or(|best| best.defect.is_nan() || off.defect < best.defect) {

@@ -2,15 +2,13 @@
 
 use super::{Constrained, ConstraintError, ExpressionConstraints, Manifold};
 use crate::lagrangian::expression::{is_name, is_reserved};
+use crate::lagrangian::thresholds::MOST_NAMES;
 use crate::lagrangian::{EulerLagrange, ExpressionError, Lagrangian, Mechanics};
 use crate::scalar::{Real, Scalar};
 use alloc::boxed::Box;
 use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
-
-/// Largest number of constraints.
-const MOST: usize = 256;
 
 /// Constraints as formulas of the coordinates and velocities of a model, without parameters.
 #[derive(Clone, Debug)]
@@ -43,7 +41,7 @@ pub enum ConstraintFormulaError {
 impl core::fmt::Display for ConstraintFormulaError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Number(found) => write!(f, "constraints: expected 1 to {MOST} formulas, found {found}"),
+            Self::Number(found) => write!(f, "constraints: expected 1 to {MOST_NAMES} formulas, found {found}"),
             Self::Name => f.write_str("constraints: expected names of 1 to 100 characters on one line"),
             Self::Coordinate(name) => write!(
                 f,
@@ -91,7 +89,7 @@ impl FormulaConstraints {
         coordinates: &[impl AsRef<str>],
         formulas: BTreeMap<String, String>,
     ) -> Result<Self, ConstraintFormulaError> {
-        if formulas.is_empty() || formulas.len() > MOST {
+        if formulas.is_empty() || formulas.len() > MOST_NAMES {
             return Err(ConstraintFormulaError::Number(formulas.len()));
         }
         if formulas

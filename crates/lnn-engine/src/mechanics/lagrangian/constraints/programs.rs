@@ -5,6 +5,7 @@ use crate::forward::Dual;
 use crate::lagrangian::accelerations::RecordMotion;
 use crate::lagrangian::elimination::{Balance, Lists, eliminate};
 use crate::lagrangian::linearization::{Rate, SparseRows, add};
+use crate::lagrangian::thresholds::PRODUCTS_PER_ELEMENT;
 use crate::platform::OnceLock;
 use crate::scalar::{Real, Scalar};
 use crate::tape::{Program, ROWS, Replay, Tracer};
@@ -12,12 +13,9 @@ use alloc::collections::BTreeMap;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-/// Largest number of products per element of the full matrix in a recorded elimination; beyond it, a dense solver is faster.
-const PRODUCTS: usize = 8;
-
 /// Returns the largest number of products in an elimination of `rows` rows.
 pub(super) fn most_products(rows: usize) -> usize {
-    PRODUCTS * rows * rows
+    PRODUCTS_PER_ELEMENT * rows * rows
 }
 
 /// Constraints as recorded functions.

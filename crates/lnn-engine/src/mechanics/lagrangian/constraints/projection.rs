@@ -3,15 +3,11 @@
 use super::rows::{dot, largest, length};
 use super::{Manifold, ManifoldRows};
 use crate::lagrangian::accelerations::are_safe;
+use crate::lagrangian::thresholds::{MOST_PROJECTION_STEPS, PROJECTION_ROUNDINGS};
 use crate::linalg::{Workspace, minimum_norm};
 use crate::scalar::{Real, Scalar, are_finite};
 use crate::tape::Replay;
 use alloc::vec::Vec;
-
-/// Largest number of Newton steps.
-const MAX_STEPS: usize = 60;
-/// Defects below this multiple of the rounding error of the state count as zero.
-const ROUNDINGS: f64 = 1024.0;
 
 /// The error for a state that could not be projected onto the constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,7 +27,7 @@ pub fn project<S: Scalar>(manifold: &dyn Manifold<S>, q: &mut [S], v: &mut [S]) 
     let mut values = Defects::new(manifold, false);
     let before = [q.to_vec(), v.to_vec()];
     let mut last = S::infinity();
-    for step in 0..MAX_STEPS {
+    for step in 0..MOST_PROJECTION_STEPS {
         if values.of.is_empty() {
             break;
         }
@@ -135,7 +131,7 @@ impl<'a, S: Scalar> Defects<'a, S> {
                 worst = Some((row, defect));
             }
         }
-        let allowed = S::of_f64(ROUNDINGS) * S::epsilon() * Real::max(size, S::min_positive());
+        let allowed = S::of_f64(PROJECTION_ROUNDINGS) * S::epsilon() * Real::max(size, S::min_positive());
         match worst {
             Some((row, defect)) if defect.is_nan() || defect > allowed => {
                 Err(OffManifold { row, defect: defect.to_f64() })

@@ -1,10 +1,8 @@
 //! Rows of small matrices: independent rows and orthogonal complements.
 
+use crate::lagrangian::thresholds::RANK_ROUNDINGS;
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
-
-/// A normalized row depends on others if its component outside their span is below this multiple of the square root of the machine epsilon.
-const RANK: f64 = 16.0;
 
 /// Subtracts the projection of `x` onto orthonormal rows, `(k, n)`; twice, because one pass leaves rounding errors.
 pub fn take_out<S: Scalar>(x: &mut [S], basis: &[S]) {
@@ -60,7 +58,7 @@ pub(super) fn independent<S: Scalar>(n: usize, matrix: &[S], tolerance: f64) -> 
 
 /// Selects independent rows up to rounding.
 pub fn independent_rows<S: Scalar>(n: usize, matrix: &[S]) -> (Vec<usize>, Vec<S>) {
-    independent(n, matrix, RANK * S::epsilon().to_f64().sqrt())
+    independent(n, matrix, RANK_ROUNDINGS * S::epsilon().to_f64().sqrt())
 }
 
 /// Returns an orthonormal basis, `(n - k, n)`, of the orthogonal complement of orthonormal rows, `(k, n)`.

@@ -7,6 +7,7 @@ use crate::lagrangian::formula_forces::FormulaForces;
 use crate::lagrangian::system::{
     Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
 };
+use crate::lagrangian::thresholds::{MOST_COORDINATES, MOST_NAMES, SHOWN_NAMES};
 use crate::lagrangian::{ExpressionLagrangian, constrained_description, systems};
 use crate::names::{taken_column, unknown};
 use crate::ops::{Binary, Unary};
@@ -17,11 +18,6 @@ use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::f64::consts::PI;
-
-/// Largest number of coordinates of a system in a file.
-const MAX_COORDINATES: usize = 64;
-/// Largest number of parameters, of definitions, and of constraints.
-const MAX_NAMES: usize = 256;
 
 /// Number of constants of a link and its joint.
 const CONSTANTS: usize = 13;
@@ -195,17 +191,17 @@ impl Description {
     fn check_counts(&self, plain: &Self) -> Outcome<()> {
         let n = plain.coordinates.len();
         let of_links = self.links.len() * CONSTANTS;
-        if n == 0 || n > MAX_COORDINATES {
-            let problem = format!("expected 1 to {MAX_COORDINATES} tables [[coordinates]], found {n}");
+        if n == 0 || n > MOST_COORDINATES {
+            let problem = format!("expected 1 to {MOST_COORDINATES} tables [[coordinates]], found {n}");
             return Err(DescriptionError::new("coordinates", problem));
         }
         let counts = [
-            ("parameters", self.parameters.len(), MAX_NAMES + of_links),
-            ("definitions", self.definitions.len(), MAX_NAMES),
-            ("inputs", self.inputs.len(), MAX_NAMES),
-            ("constraints", self.constraints.len(), MAX_NAMES),
-            ("events", self.events.len(), MAX_NAMES),
-            ("measured", self.measured.len(), MAX_NAMES),
+            ("parameters", self.parameters.len(), MOST_NAMES + of_links),
+            ("definitions", self.definitions.len(), MOST_NAMES),
+            ("inputs", self.inputs.len(), MOST_NAMES),
+            ("constraints", self.constraints.len(), MOST_NAMES),
+            ("events", self.events.len(), MOST_NAMES),
+            ("measured", self.measured.len(), MOST_NAMES),
         ];
         for (key, count, most) in counts {
             if count > most {
@@ -647,9 +643,8 @@ fn circle(waiting: &[Waiting<'_>]) -> (String, String) {
         way.push(name);
     }
     let name = way.first().map(|name| name.to_string()).unwrap_or_default();
-    const SHOWN: usize = 8;
     let text = match way.len() {
-        length if length > SHOWN => format!("{} -> ..", way[..SHOWN].join(" -> ")),
+        length if length > SHOWN_NAMES => format!("{} -> ..", way[..SHOWN_NAMES].join(" -> ")),
         _ => way.join(" -> "),
     };
     (name, text)

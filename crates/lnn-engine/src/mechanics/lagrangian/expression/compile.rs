@@ -2,6 +2,7 @@
 
 use super::parse::Number;
 use super::{Expression, ExpressionError, Node, PI};
+use crate::lagrangian::thresholds::{MOST_OPERATIONS, STACK_REGISTERS};
 use crate::names::unknown;
 use crate::ops::{Binary, Unary};
 use crate::platform::Map;
@@ -9,9 +10,6 @@ use crate::scalar::{Real, Scalar};
 use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::vec::Vec;
-
-/// Largest number of operations of a program.
-const MAX_OPERATIONS: usize = 1 << 16;
 
 /// The meaning of a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,8 +80,8 @@ impl Compiler {
                 Node::Binary(Binary::Powf, a, b) => self.power(at(a), at(b)),
                 Node::Binary(function, a, b) => self.binary(*function, at(a), at(b)),
             };
-            if self.entries.len() > MAX_OPERATIONS {
-                let problem = format!("expected a system of at most {MAX_OPERATIONS} operations");
+            if self.entries.len() > MOST_OPERATIONS {
+                let problem = format!("expected a system of at most {MOST_OPERATIONS} operations");
                 return Err(ExpressionError::new(1, problem));
             }
             values.push(value);
@@ -352,9 +350,6 @@ pub struct Formula {
     result: Operand,
 }
 
-/// Programs with at most this many registers store them on the stack.
-const FEW: usize = 16;
-
 impl Formula {
     pub(super) fn new(instructions: Vec<Instruction>, numbers: Vec<Number>, registers: u32, result: Operand) -> Self {
         Self { instructions, numbers, registers: registers as usize, result }
@@ -362,8 +357,8 @@ impl Formula {
 
     /// Evaluates the program; returns `NaN` if a parameter, a coordinate or a velocity is missing.
     pub fn evaluate<R: Real>(&self, parameters: &[R], q: &[R], v: &[R]) -> R {
-        if self.registers <= FEW {
-            self.run(&mut [R::zero(); FEW], parameters, q, v)
+        if self.registers <= STACK_REGISTERS {
+            self.run(&mut [R::zero(); STACK_REGISTERS], parameters, q, v)
         } else {
             self.run(&mut vec![R::zero(); self.registers], parameters, q, v)
         }

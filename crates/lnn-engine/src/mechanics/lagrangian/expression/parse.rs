@@ -1,6 +1,7 @@
 //! Parses a text into a tree: a tokenizer, then recursive descent that writes operands before operations.
 
 use super::{Expression, ExpressionError, FUNCTIONS, Function, Node, PI, function};
+use crate::lagrangian::thresholds::{MOST_CHARACTERS, MOST_NESTING};
 use crate::names::nearest;
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Scalar};
@@ -9,9 +10,6 @@ use alloc::vec::Vec;
 use core::str::FromStr;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
-
-/// Deepest nesting of parentheses, signs and powers: more than formulas need, and far below what the stack allows.
-const MAX_DEPTH: usize = 100;
 
 /// Parses a formula.
 pub(super) fn parse(text: &str) -> Result<Expression, ExpressionError> {
@@ -55,8 +53,8 @@ impl<'a> Parser<'a> {
         self.nodes.len() as u32 - 1
     }
     fn deeper(&mut self, inner: fn(&mut Self) -> Outcome) -> Outcome {
-        if self.depth == MAX_DEPTH {
-            let problem = format!("expected at most {MAX_DEPTH} parentheses, signs and powers within each other");
+        if self.depth == MOST_NESTING {
+            let problem = format!("expected at most {MOST_NESTING} parentheses, signs and powers within each other");
             return Err(ExpressionError::new(self.next().column, problem));
         }
         self.depth += 1;
@@ -208,9 +206,6 @@ impl FromStr for Expression {
     }
 }
 
-/// Largest number of characters of a formula.
-const MAX_CHARACTERS: usize = 1 << 16;
-
 /// A lexeme of a formula.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Lexeme<'a> {
@@ -254,8 +249,8 @@ pub fn is_name(text: &str) -> bool {
 
 /// Splits a text into tokens, including the end.
 fn tokens(text: &str) -> Result<Vec<Token<'_>>, ExpressionError> {
-    if text.chars().nth(MAX_CHARACTERS).is_some() {
-        return Err(ExpressionError::new(1, format!("expected a formula of at most {MAX_CHARACTERS} characters")));
+    if text.chars().nth(MOST_CHARACTERS).is_some() {
+        return Err(ExpressionError::new(1, format!("expected a formula of at most {MOST_CHARACTERS} characters")));
     }
     let (mut found, mut rest, mut column) = (Vec::new(), text, 1);
     while let Some(c) = rest.chars().next() {

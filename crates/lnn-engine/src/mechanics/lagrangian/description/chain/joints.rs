@@ -3,19 +3,18 @@
 use super::Convention;
 use crate::lagrangian::description::{Description, DescriptionError, Quantity};
 use crate::lagrangian::recursion::{Joint, Matrix, applied, cross, product, transposed};
+use crate::lagrangian::thresholds::ROTATION_ROUNDING;
 use alloc::vec::Vec;
 #[cfg(not(feature = "std"))]
 use num_traits::Float as _;
 
-/// A sine or cosine below this counts as rounding error.
-const ROUNDING: f64 = 1e-15;
 /// The identity, for the base and for links whose constants are given in the frame of their joint.
 const SAME: Matrix<f64> = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 type Outcome<T> = Result<T, DescriptionError>;
 
 fn exact(x: f64) -> f64 {
-    if x.abs() < ROUNDING { 0.0 } else { x }
+    if x.abs() < ROTATION_ROUNDING { 0.0 } else { x }
 }
 
 /// Computes sine and cosine, exact at multiples of a quarter turn.

@@ -13,10 +13,11 @@ mod joints;
 #[cfg(test)]
 mod tests;
 
-#[cfg(feature = "serde")]
 use super::read;
 use super::{CoordinateDescription, Description, DescriptionError, ParameterDescription, Quantity, is_false};
 use crate::lagrangian::recursion::{Joint, Row, Shape};
+#[cfg(feature = "serde")]
+use crate::lagrangian::thresholds::{COULOMB_SPEED, MOST_LINKS};
 use crate::names::unknown;
 use alloc::collections::BTreeMap;
 use alloc::string::{String, ToString};
@@ -28,11 +29,8 @@ pub use joints::turned;
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-/// Largest number of links.
-const MAX_LINKS: usize = 64;
 /// Defaults: acceleration of gravity in m/s^2, and speed at which dry friction reaches three quarters of its maximum.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
-const COULOMB_SPEED: f64 = 0.01;
 /// Default bounds of coordinates that the file does not describe: positions in m, and velocities in rad/s or m/s.
 const BOUNDS: (f64, f64) = (1.0, 3.0);
 
@@ -208,8 +206,8 @@ impl Description {
         match (&self.chain, count) {
             (None, 0) => return Ok(plain),
             (Some(_), 0) => return fault("chain", "expected tables [[links]] beside it".to_string()),
-            (_, 1..=MAX_LINKS) => {}
-            _ => return fault("links", format!("expected 1 to {MAX_LINKS} tables [[links]], found {count}")),
+            (_, 1..=MOST_LINKS) => {}
+            _ => return fault("links", format!("expected 1 to {MOST_LINKS} tables [[links]], found {count}")),
         }
         plain.parameters.clear();
         if self.metric.is_some() {
