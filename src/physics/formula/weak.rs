@@ -412,3 +412,90 @@ pub(super) struct Normal {
     pub right: Vec<f64>,
     pub size: Vec<f64>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::extent::{Extent, Friction};
+    use super::super::families::Families;
+    use super::super::function::Notation;
+    use super::*;
+
+    /// Two masses of 1 kg, each on a spring of 1 N/m, with another such spring between them, and a third mass far away; the second spring's
+    /// force is known instead of a term if `known`.
+    fn windows(known: bool) -> (Library, Vec<usize>, Windows) {
+        let names = ["a", "b", "c"].map(String::from);
+        let extent = Extent { families: Families::default(), gyroscopic: false, friction: Friction::None, drive: None };
+        let library = Library::new(&names, &[false; 3], extent, &[]).unwrap();
+        let own = ["a_dot^2", "b_dot^2", "c_dot^2", "a^2", "b^2", "c^2", "a*b"];
+        let find = |text: &&str| (0..library.terms.len()).find(|&k| library.written(k, Notation::System) == **text);
+        let terms: Vec<usize> = own.iter().map(|text| find(text).unwrap()).collect();
+        let times: Vec<f64> = (0..2001).map(|k| 0.01 * f64::from(k)).collect();
+        let root = 3_f64.sqrt();
+        let both = |x: f64, y: f64| [x + 0.5 * y, x - 0.5 * y];
+        let position = |t: &f64| [&both(t.sin(), (root * t).sin())[..], &[(2.0 * t).cos()]].concat();
+        let velocity = |t: &f64| [&both(t.cos(), root * (root * t).cos())[..], &[-2.0 * (2.0 * t).sin()]].concat();
+        let coupling = |q: Vec<f64>| [q[1], q[0], 0.0];
+        let stretch = Stretch {
+            q: times.iter().flat_map(position).collect(),
+            v: times.iter().flat_map(velocity).collect(),
+            force: times.iter().filter(|_| known).flat_map(|t| coupling(position(t))).collect(),
+            times,
+            block: 0,
+        };
+        let windows = Windows::new(&library, &terms, &[stretch], 2.0);
+        (library, terms, windows)
+    }
+
+    /// Coefficients of the terms of [`windows`], with and without the coupling.
+    const COUPLED: [f64; 7] = [0.5, 0.5, 0.5, -1.0, -1.0, -2.0, 1.0];
+    const UNCOUPLED: [f64; 7] = [0.5, 0.5, 0.5, -1.0, -1.0, -2.0, 0.0];
+
+    #[test]
+    fn exact_motion_satisfies_its_own_equations_alone() {
+        for (known, truth) in [(false, COUPLED), (true, UNCOUPLED)] {
+            let (_, _, windows) = windows(known);
+            assert_eq!((windows.driven(), windows.len()), (known, 55));
+            for error in windows.errors_by_coordinate(&truth, &[1.0; 3]) {
+                assert!(error < 1e-12, "{known}: {error}");
+            }
+            for k in 3..7 {
+                let mut wrong = truth;
+                wrong[k] += 0.1;
+                let errors = windows.errors_by_coordinate(&wrong, &[1.0; 3]);
+                let touched: &[usize] = [&[0][..], &[1], &[2], &[0, 1]][k - 3];
+                for (i, error) in errors.into_iter().enumerate() {
+                    assert_eq!(error > 1e-4, touched.contains(&i), "{known}, term {k}, coordinate {i}: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn normal_equations_lead_to_the_coefficients() {
+        for (known, truth) in [(false, COUPLED), (true, UNCOUPLED)] {
+            let (_, _, windows) = windows(known);
+            let used = vec![true; windows.len()];
+            let normal = windows.normal(&truth, &[0, 1, 2, 3, 4, 5, 6], &[1.0, 2.0, 0.5], &used);
+            for (row, right) in normal.matrix.chunks_exact(7).zip(&normal.right) {
+                let product: f64 = row.iter().zip(truth).map(|(a, c)| a * c).sum();
+                assert!((product - right).abs() < 1e-9 * row.iter().fold(1.0, |m, a| a.abs().max(m)), "{row:?}");
+            }
+            // The size of the mass matrix is that of the coefficients that gave it.
+            let size: f64 = normal.size.iter().zip(truth).map(|(size, c)| size * c).sum();
+            assert!((size - 1.0).abs() < 1e-12, "{size}");
+        }
+    }
+
+    #[test]
+    fn masses_are_definite_where_all_are_positive() {
+        let (library, terms, windows) = windows(false);
+        let unit = windows.unit_mass(&library, &terms, &[1.0, 2.0, 0.5]);
+        assert_eq!(unit[..3], [0.5, 0.125, 2.0]);
+        assert!(unit[3..].iter().all(|c| *c == 0.0));
+        assert!(windows.is_definite(&unit) && windows.is_definite(&COUPLED) && windows.is_regular(&COUPLED));
+        assert!(!windows.is_definite(&COUPLED.map(|c| -c)) && windows.is_regular(&COUPLED.map(|c| -c)));
+        let massless = [0.5, 0.5, 0.0, -1.0, -1.0, -2.0, 1.0];
+        assert!(!windows.is_definite(&massless) && !windows.is_regular(&massless));
+        assert!(windows.errors(&massless, &[1.0; 3]).iter().all(|error| error.is_infinite()));
+    }
+}

@@ -78,6 +78,11 @@ fn constants_of_a_double_pendulum_lie_within_their_errors() {
         for (residual, noise) in found.residuals.iter().zip([2e-3, 3e-3]) {
             assert!((residual.rms / noise - 1.0).abs() < 0.12, "{residual:?}");
         }
+        // The report has a row for each constant.
+        let report = found.findings().to_string();
+        for symbol in symbols {
+            assert_eq!(report.lines().filter(|line| line.trim_start().starts_with(symbol)).count(), 1, "{report}");
+        }
     }
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     assert!((0.2..2.2).contains(&mean) && squares.iter().all(|s| *s < 16.0), "{squares:?}");

@@ -95,14 +95,16 @@ fn nothing_grows_unseen() {
 
 #[test]
 fn numbers_are_recognized() {
-    let numbers = ["const A: f64 = 3.0;", "pub(super) const B: usize = 4;", "pub const C: u64 = 1 << 20;"];
-    assert!(numbers.into_iter().all(is_number));
-    let others = [
-        "const NAMES: [&str; 1] = [\"a\"];",
-        "let x: f64 = 3.0;",
+    let numbers = [
+        "const A: f64 = 3.0;",
+        "pub(super) const B: usize = 4;",
+        "pub const C: u64 = 1 << 20;",
         "    const RUN: usize = 16;",
-        "const D: Kind = of(1);",
+        "const PAIR: (f64, usize) = (1.0, 2);",
+        "const ROW: [f64; 2] = [1.0, 2.0];",
     ];
+    assert!(numbers.into_iter().all(is_number));
+    let others = ["const NAMES: [&str; 1] = [\"a\"];", "let x: f64 = 3.0;", "const D: Kind = of(1);"];
     assert!(!others.into_iter().any(is_number));
 }
 
