@@ -13,10 +13,10 @@ mod joints;
 #[cfg(test)]
 mod tests;
 
+#[cfg(feature = "serde")]
 use super::read;
 use super::{CoordinateDescription, Description, DescriptionError, ParameterDescription, Quantity, is_false};
 use crate::lagrangian::recursion::{Joint, Row, Shape};
-#[cfg(feature = "serde")]
 use crate::lagrangian::thresholds::{COULOMB_SPEED, MOST_LINKS};
 use crate::names::unknown;
 use alloc::collections::BTreeMap;
