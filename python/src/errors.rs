@@ -2,15 +2,23 @@
 
 use lnn::pipeline::PipelineError;
 use lnn::recording::{DataError, Problem};
-use pyo3::PyErr;
 use pyo3::exceptions::{
     PyFileExistsError, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyRuntimeError, PyValueError,
 };
+use pyo3::{PyErr, PyResult};
 use std::fmt::Display;
 
 /// What was given is wrong.
 pub fn value(error: impl Display) -> PyErr {
     PyValueError::new_err(error.to_string())
+}
+
+/// The choice of this name; `what` is the argument that gives it.
+pub fn choice<T: Copy>(what: &str, given: &str, all: &[T], name: fn(T) -> &'static str) -> PyResult<T> {
+    all.iter().copied().find(|&known| name(known) == given).ok_or_else(|| {
+        let known: Vec<&str> = all.iter().map(|&known| name(known)).collect();
+        value(format_args!("{what}: expected one of {}, found {given:?}", known.join(", ")))
+    })
 }
 
 /// What was asked for cannot be done.

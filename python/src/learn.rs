@@ -1,7 +1,7 @@
 //! Trainings and fits.
 
 use crate::attend::attended;
-use crate::errors::{pipeline, runtime, value};
+use crate::errors::{choice, pipeline, runtime, value};
 use crate::readings::said;
 use crate::recorded::{Motion, Source};
 use crate::subject::{Subject, slice, values};
@@ -27,14 +27,6 @@ use std::sync::{Arc, Mutex};
 /// What was learned: models, that of the fit or training first, history as JSON, facts as JSON, what a terminal and what a notebook shows of
 /// them, why it ended.
 type Learned = (Vec<Subject>, String, String, (String, String), Option<String>);
-
-fn preset(name: &str) -> PyResult<Preset> {
-    let known = Preset::ALL.into_iter().find(|known| known.name() == name);
-    known.ok_or_else(|| {
-        let known = Preset::ALL.map(Preset::name).join(", ");
-        value(format_args!("preset: expected one of {known}, found {name:?}"))
-    })
-}
 
 /// A value of an enumeration by its name in a configuration.
 fn named<T: DeserializeOwned>(what: &str, name: &str) -> PyResult<T> {
@@ -84,7 +76,7 @@ pub fn configuration(
     changes: &str,
 ) -> PyResult<String> {
     let instance = system.system_instance()?;
-    let chosen = preset(preset_name)?;
+    let chosen = choice("preset", preset_name, &Preset::ALL, Preset::name)?;
     let config = match structure {
         Some(structure) => chosen.config_of(&instance, named("structure", structure)?),
         None => chosen.config(&instance),

@@ -1,7 +1,7 @@
 //! The shadow of a black hole before the sky, through a metric written down or learned.
 
 use crate::attend::whole;
-use crate::errors::value;
+use crate::errors::{choice, value};
 use crate::readings::shown;
 use crate::subject::Subject;
 use lnn::pipeline::Event;
@@ -48,15 +48,10 @@ impl Choices {
     }
 
     fn camera(&self, chart: Chart) -> PyResult<Camera> {
-        let observer = Observer::ALL.into_iter().find(|known| known.name() == self.observer);
-        let refused = || {
-            let known = Observer::ALL.map(Observer::name).join(" or ");
-            value(format_args!("observer: expected {known}, found {:?}", self.observer))
-        };
         Ok(Camera {
             chart,
             azimuth: self.azimuth.to_radians(),
-            observer: observer.ok_or_else(refused)?,
+            observer: choice("observer", &self.observer, &Observer::ALL, Observer::name)?,
             field_of_view: self.field_of_view.to_radians(),
             width: self.width,
             height: self.height,

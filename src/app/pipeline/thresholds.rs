@@ -143,8 +143,6 @@ pub(super) const NEAR_MAP: f64 = 0.1;
 pub(super) const MAX_NODES: u32 = 1 << 20;
 /// Largest number of links and joints, or of elements below the world, including fixed ones.
 pub(super) const MAX_ELEMENTS: usize = 4096;
-/// Largest number of moving links.
-pub(super) const MAX_LINKS: usize = 64;
 /// Default bounds of joints, in rad and m.
 pub(super) const DEFAULT_BOUNDS: (f64, f64) = (std::f64::consts::PI, 1.0);
 /// Default bound of speeds, in rad/s or m/s.

@@ -13,7 +13,7 @@ mod xml;
 use crate::lagrangian::system::System;
 use crate::lagrangian::{Description, find, inertia_symbols, is_free_name, loss_symbols};
 use crate::pipeline::from_table;
-use crate::pipeline::thresholds::{DEFAULT_BOUNDS, DEFAULT_SPEED, MAX_LINKS};
+use crate::pipeline::thresholds::{DEFAULT_BOUNDS, DEFAULT_SPEED};
 use rigid::{Body, Place};
 use std::path::Path;
 use toml::{Table, Value};
@@ -90,8 +90,8 @@ fn read(text: &str) -> Result<(Robot, usize), Fault> {
         _ => return Err(xml::fault(root, "expected <robot> of a URDF or <mujoco> of an MJCF file")),
     };
     match robot.links.len() {
-        1..=MAX_LINKS => Ok((robot, line)),
-        count => Err((line, format!("expected 1 to {MAX_LINKS} joints that move, found {count}"))),
+        1..=Description::MOST_LINKS => Ok((robot, line)),
+        count => Err((line, format!("expected 1 to {} joints that move, found {count}", Description::MOST_LINKS))),
     }
 }
 

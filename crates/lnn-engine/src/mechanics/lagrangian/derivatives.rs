@@ -5,7 +5,7 @@ use super::error::MechanicsError;
 use super::taylor::{Space, Taylor};
 use super::{Lagrangian, Request};
 use crate::forward::{Dual, HyperDual, Jet, array};
-use crate::lagrangian::thresholds::TOGETHER_VELOCITIES;
+use crate::lagrangian::thresholds::BLOCK_VELOCITIES;
 use crate::scalar::{Real, Scalar};
 use crate::tape::Depth;
 use alloc::vec::Vec;
@@ -233,7 +233,7 @@ pub fn metric_jets<S: Scalar>(
         return shape("velocities", q.len(), v.len());
     }
     let groups = groups(n);
-    let mut space = Space::new(n, n.min(TOGETHER_VELOCITIES));
+    let mut space = Space::new(n, n.min(BLOCK_VELOCITIES));
     let jet = |(q, v): (&[S], &[S])| {
         let mut jet = MetricJet::zeros(n);
         for group in &groups {
@@ -258,11 +258,11 @@ pub fn metric_jets<S: Scalar>(
 
 /// Divides the velocities into groups such that every pair occurs in one of them.
 fn groups(n: usize) -> Vec<Vec<usize>> {
-    if n <= TOGETHER_VELOCITIES {
+    if n <= BLOCK_VELOCITIES {
         return vec![(0..n).collect()];
     }
     let blocks: Vec<Vec<usize>> =
-        (0..n).step_by(TOGETHER_VELOCITIES / 2).map(|i| (i..n.min(i + TOGETHER_VELOCITIES / 2)).collect()).collect();
+        (0..n).step_by(BLOCK_VELOCITIES / 2).map(|i| (i..n.min(i + BLOCK_VELOCITIES / 2)).collect()).collect();
     let pairs = (0..blocks.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
     pairs.map(|(a, b)| [blocks[b].as_slice(), &blocks[a]].concat()).collect()
 }

@@ -1,6 +1,7 @@
 //! Limits, verdicts and settings of Lagrangians, their constraints and their descriptions; defaults of systems stand in their tables.
 
-// Limits of what a file may describe, which keep recorded programs within memory. `cargo test --test suite -- stress` and the fuzz targets check them.
+// Limits of what a file may describe, which keep recorded programs within memory. `cargo test -p lnn-engine -- lagrangian`, `cargo test --test
+// suite -- mechanics` and the fuzz targets check them.
 
 /// Largest number of coordinates of a system in a file.
 pub(super) const MOST_COORDINATES: usize = 64;
@@ -51,7 +52,7 @@ pub(super) const SHOWN_NAMES: usize = 8;
 /// Largest number of rows in a picture; in pictures of larger matrices a character represents several elements.
 pub(super) const PICTURE_ROWS: usize = 64;
 
-// Sizes at which another routine is faster, by `cargo bench --bench systems` and `cargo bench --bench hessians`.
+// Sizes at which another routine is faster or cheap enough, by `cargo bench --bench systems` and `cargo bench --bench hessians`.
 
 /// Up to this many coordinates, a few states are evaluated with forward-mode numbers on the stack, because the interpreter has more
 /// overhead.
@@ -69,7 +70,7 @@ pub(super) const MOST_WHOLE_COORDINATES: usize = 4;
 /// Largest number of products per element of the full matrix in a recorded elimination; beyond it, a dense solver is faster.
 pub(super) const PRODUCTS_PER_ELEMENT: usize = 8;
 /// Largest number of velocities that vary together; beyond it, pairs of blocks of half this size are used.
-pub(super) const TOGETHER_VELOCITIES: usize = 8;
+pub(super) const BLOCK_VELOCITIES: usize = 8;
 /// Programs with at most this many registers store them on the stack.
 pub(super) const STACK_REGISTERS: usize = 16;
 /// From this many numbers on, a call of the widest vector instructions is worthwhile.

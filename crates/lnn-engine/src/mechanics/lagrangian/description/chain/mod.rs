@@ -198,6 +198,9 @@ impl Description {
         self.unfolded().unwrap_or_else(|_| self.clone())
     }
 
+    /// Largest number of links of a chain.
+    pub const MOST_LINKS: usize = MOST_LINKS;
+
     /// Expands the links to coordinates, parameters and formulas.
     pub(super) fn unfolded(&self) -> Result<Self, DescriptionError> {
         let fault = |key: &str, problem: String| Err(DescriptionError::new(key, problem));

@@ -93,10 +93,7 @@ fn a_mistake_in_links_names_its_key() {
     assert_eq!(of(r#""links": [{}], "parameters": {"k": 1}, "lagrangian": "-kk*q1^2""#), "parameters.k");
     let coordinates = r#""coordinates": [{"name": "a", "velocity_bounds": [-1, 1], "periodic": true}]"#;
     assert_eq!(of(&format!(r#""links": [{{}}, {{}}], {coordinates}"#)), "coordinates");
-    assert_eq!(
-        of(&format!(r#""links": [{}]"#, vec!["{}"; crate::lagrangian::thresholds::MOST_LINKS + 1].join(","))),
-        "links"
-    );
+    assert_eq!(of(&format!(r#""links": [{}]"#, vec!["{}"; Description::MOST_LINKS + 1].join(","))), "links");
     for (second, at) in [
         (r#""parent": 2"#, ".parent"),
         (r#""parent": "c""#, ".parent"),
