@@ -217,7 +217,10 @@ fn hanging(rods: usize) -> Vec<f64> {
 
 /// The chain of so many rods of the catalogue.
 fn rods(n: usize) -> Box<dyn EulerLagrange<f64>> {
-    lnn::lagrangian::build::<f64>(&format!("cartesian-chain-{n}"), &[]).expect("of the catalogue")
+    lnn::lagrangian::SystemInstance::<f64>::named(&format!("cartesian-chain-{n}"), &[])
+        .expect("of the catalogue")
+        .build()
+        .expect("of the catalogue")
 }
 
 /// The end of a short motion of a model under constraints.
@@ -286,7 +289,10 @@ fn count(name: &str, n: usize, times: usize) {
             });
         }
         "batch" => {
-            let arm = lnn::lagrangian::build::<f64>("double-pendulum", &[]).expect("of the catalogue");
+            let arm = lnn::lagrangian::SystemInstance::<f64>::named("double-pendulum", &[])
+                .expect("of the catalogue")
+                .build()
+                .expect("of the catalogue");
             let request = Request::MASS_MATRIX | Request::CORIOLIS;
             repeat(&mut || arm.terms(black_box(q), v, request, &mut terms).expect(regular));
         }

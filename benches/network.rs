@@ -8,7 +8,7 @@ mod networks;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::network::{Architecture, Initialization, initial_weights};
+use lnn::network::{Architecture, Initialization};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::scalar::Scalar;
 use lnn::tape::{Depth, Evaluation, STATES};
@@ -28,7 +28,7 @@ struct Setup<S> {
 fn setup<S: Scalar>(n: usize, width: usize, batch: usize) -> Setup<S> {
     let architecture = architecture(n, width, 1.0);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    let weights = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let weights = architecture.initial_weights(Initialization::Default, &mut rng);
     let mut draw = || (0..batch * n).map(|_| S::of_f64(rng.random_range(-10.0..10.0))).collect();
     let data = Dataset::new(n, draw(), draw(), draw()).expect("finite numbers");
     Setup { architecture, weights, data }

@@ -5,7 +5,7 @@
 
 use clap::Parser;
 use lnn::configuration::Config;
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use lnn::rollout::{Integrator, RolloutOptions, rollout_many, rollout_together};
 use lnn::training::{Hooks, run};
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// A small training of every kind of step: penalty, L-BFGS, validation.
 fn config(seed: u64) -> Config {
-    let system = configure::<f64>("double-pendulum", &[]).expect("the defaults are valid");
+    let system = SystemInstance::<f64>::named("double-pendulum", &[]).expect("the defaults are valid");
     let mut config = Preset::Quick.config(&system).expect("every system has a quick preset");
     config.seed = seed;
     (config.data.training, config.data.validation, config.data.test) = (4000, 500, 500);

@@ -4,7 +4,7 @@
 mod ratio;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use lnn::geometry::geometries;
+use lnn::geometry::Geometry;
 use lnn::lagrangian::{self, Accelerations, Linearizer, Request, Terms, Torques};
 use lnn::pipeline::parse_system;
 use lnn::scalar::Scalar;
@@ -36,7 +36,10 @@ num_dual_hessian!(hessian_f64, f64, Dual2SVec64<4>);
 /// The double pendulum's terms against the Hessian of its Lagrangian, one state at a time, in the same run.
 fn ratios<S: Scalar>(one: fn(&[S], &[S])) {
     let batch = 1024;
-    let built = lagrangian::build::<S>("double-pendulum", &[]).expect("the defaults are valid");
+    let built = lagrangian::SystemInstance::<S>::named("double-pendulum", &[])
+        .expect("the defaults are valid")
+        .build()
+        .expect("the defaults are valid");
     let numbers =
         |shift: f64| -> Vec<S> { (0..2 * batch).map(|i| S::of_f64((shift + 0.7391 * i as f64).sin() * 2.0)).collect() };
     let (q, v) = (numbers(0.1), numbers(0.7));
@@ -56,8 +59,8 @@ fn ratios<S: Scalar>(one: fn(&[S], &[S])) {
 fn described(text: &str, name: &str) {
     let batch = 1024;
     let system = parse_system(text).expect("an example is valid");
-    let written = lagrangian::configure_system::<f64>(Cow::Owned(system), &[]).expect("the defaults are valid");
-    let coded = lagrangian::configure::<f64>(name, &[]).expect("the defaults are valid");
+    let written = lagrangian::SystemInstance::<f64>::new(Cow::Owned(system), &[]).expect("the defaults are valid");
+    let coded = lagrangian::SystemInstance::<f64>::named(name, &[]).expect("the defaults are valid");
     let (n, bounds) = (coded.coordinates, coded.system.validation(coded.coordinates));
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut draw =
@@ -78,7 +81,7 @@ fn seven_joints(c: &mut Criterion) {
         let text = include_str!("../examples/systems/seven_joints.toml");
         let text = text.replace("friction = true", &format!("friction = {friction}"));
         let mut configured =
-            lagrangian::configure_system::<f64>(Cow::Owned(parse_system(&text).expect("an example is valid")), &[])
+            lagrangian::SystemInstance::<f64>::new(Cow::Owned(parse_system(&text).expect("an example is valid")), &[])
                 .expect("the defaults are valid");
         // No constant of an arm is zero.
         configured.parameters.iter_mut().enumerate().for_each(|(k, p)| *p += 0.02 + 0.01 * (k as f64).sin());
@@ -117,9 +120,9 @@ fn benches(c: &mut Criterion) {
     ratios::<f64>(hessian_f64);
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let longer = ["8", "20"].map(|n| ("n-pendulum", vec![("n".to_string(), n.to_string())]));
-    let systems = lagrangian::systems().iter().map(|system| (system.name.as_ref(), Vec::new())).chain(longer);
+    let systems = lagrangian::System::all().iter().map(|system| (system.name.as_ref(), Vec::new())).chain(longer);
     for (name, given) in systems {
-        let configured = lagrangian::configure::<f64>(name, &given).expect("the values are valid");
+        let configured = lagrangian::SystemInstance::<f64>::named(name, &given).expect("the values are valid");
         let (system, n) = (&configured.system, configured.coordinates);
         let built = configured.build().expect("the system is of the catalogue");
         let bounds = system.validation(n);
@@ -146,7 +149,7 @@ fn benches(c: &mut Criterion) {
             if system.time_like.is_some() && batch == 128 {
                 let rest = vec![0.0; n];
                 group.bench_function(BenchmarkId::new("geometry", batch), |b| {
-                    b.iter(|| geometries(&*built, black_box(&q), &rest));
+                    b.iter(|| Geometry::of(&*built, black_box(&q), &rest));
                 });
             }
             if name == "double-pendulum" {

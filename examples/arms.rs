@@ -7,11 +7,11 @@
 //! runs of its own and learns little.
 
 use lnn::identification::{Identified, IdentifyOptions, identify};
-use lnn::lagrangian::{SystemInstance, configure_system};
+use lnn::lagrangian::SystemInstance;
 use lnn::pipeline::parse_system;
 use lnn::prelude::*;
 use lnn::random::RngStream;
-use lnn::recording::{Columns, RecordedTrajectory, Recording, read_recording};
+use lnn::recording::{Columns, LoadedRecording, RecordedTrajectory, Recording};
 use rand_distr::{Distribution, StandardNormal};
 use std::borrow::Cow;
 use std::path::Path;
@@ -56,7 +56,7 @@ pub fn read(path: &Path) -> Outcome<(Recording, Vec<RecordedTrajectory>)> {
         trajectory: Some("run".into()),
         ..Columns::default()
     };
-    let mut recording = read_recording(&[path], &columns)?.recording;
+    let mut recording = LoadedRecording::read(&[path], &columns)?.recording;
     let runs = recording.tracks.len();
     if runs <= HELD_BACK {
         return Err(format!("expected more than {HELD_BACK} runs, found {runs}").into());
@@ -73,7 +73,7 @@ pub fn textbook(arms: usize, given: &[(&str, f64)]) -> Outcome<SystemInstance<f6
     };
     let system = parse_system(text).map_err(|(line, problem)| format!("{line}: {problem}"))?;
     let given: Vec<(String, String)> = given.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-    Ok(configure_system(Cow::Owned(system), &given)?)
+    Ok(SystemInstance::new(Cow::Owned(system), &given)?)
 }
 
 /// The constants of the textbook's arms, and the offsets of the encoders.

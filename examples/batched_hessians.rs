@@ -3,7 +3,7 @@
 // The tests run `main` in a program that has this allocator already.
 #[cfg(test)]
 use crate::counting;
-use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
+use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use lnn::network::{ModelFile, NetworkLagrangian};
 use std::path::Path;
 
@@ -44,7 +44,7 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/double_pendulum.safetensors");
     let ModelFile { header, weights } = ModelFile::<f64>::load(&path)?;
     let learned = NetworkLagrangian::new(header.architecture, weights)?;
-    let written = build::<f64>("double-pendulum", &[])?;
+    let written = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
     let models: [(&str, &dyn EulerLagrange<f64>); 2] = [("hand-written", &*written), ("learned", &learned)];
     for (name, model) in models {
         let mut state = [vec![0.0; 2 * BATCH], vec![0.0; 2 * BATCH]];

@@ -3,7 +3,7 @@
 //!
 //! `lnn train kerr-cartesian --out runs/kerr`, then `cargo run --release --example black_holes -- runs/kerr`.
 
-use lnn::lagrangian::{configure_values, find};
+use lnn::lagrangian::{System, SystemInstance};
 use lnn::network::{ModelFile, NetworkLagrangian};
 use lnn::pipeline::model_file;
 use lnn::relativity::{CentralCoordinates, LearnedHole};
@@ -14,7 +14,7 @@ use std::path::Path;
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("expected the directory of a run, or its model file")?;
     let ModelFile { header, weights } = ModelFile::<f64>::load(&model_file(Path::new(&path))?)?;
-    let system = configure_values::<f64>(Cow::Borrowed(find(&header.system)?), &header.parameters)?;
+    let system = SystemInstance::<f64>::with_values(Cow::Borrowed(System::named(&header.system)?), &header.parameters)?;
     let coordinates = system.system.coordinates(system.coordinates);
     let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_ref()).collect();
     let around = CentralCoordinates::of_names(&names)

@@ -1,7 +1,7 @@
 //! Reads the Lagrangian of a recorded double pendulum off its angles alone.
 
-use lnn::formula::{FormulaOptions, Verdict, formula_of_motion};
-use lnn::recording::{Columns, read_recording};
+use lnn::formula::{FormulaOptions, FoundFormula, Verdict};
+use lnn::recording::{Columns, LoadedRecording};
 
 /// Finds the formula and prints it.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -9,10 +9,10 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let columns =
         Columns { periodic: angles.clone(), coords: angles, trajectory: Some("run".into()), ..Columns::default() };
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/data/pendulum.csv");
-    let recording = read_recording(&[file], &columns)?.recording;
+    let recording = LoadedRecording::read(&[file], &columns)?.recording;
     let options =
         FormulaOptions { friction: true, gyroscopic: false, bootstraps: 20, threads: 2, ..FormulaOptions::default() };
-    let found = formula_of_motion(&recording, &options)?;
+    let found = FoundFormula::of_motion(&recording, &options)?;
     println!("{:?}, residual {:.3} times the noise", found.verdict, found.residual);
     println!("L = {}\nD = {}", found.text(false), found.text(true));
     for term in &found.terms {

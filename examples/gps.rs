@@ -8,7 +8,7 @@
 //! finds with the truth.
 
 use lnn::identification::{Identified, IdentifyOptions, identify};
-use lnn::lagrangian::{SystemInstance, configure_system};
+use lnn::lagrangian::SystemInstance;
 use lnn::pipeline::parse_system;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
@@ -54,7 +54,7 @@ pub fn main() -> Outcome<()> {
 fn earth(given: &[(&str, f64)]) -> Outcome<SystemInstance<f64>> {
     let system = parse_system(FORM).map_err(|(line, problem)| format!("{line}: {problem}"))?;
     let given: Vec<(String, String)> = given.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-    Ok(configure_system(Cow::Owned(system), &given)?)
+    Ok(SystemInstance::new(Cow::Owned(system), &given)?)
 }
 
 /// The positions of a file, one trajectory for each satellite: m, in s from midnight of the first day.

@@ -2,7 +2,7 @@
 //!
 //! Between measurements state and covariance move by [`Flow::jacobian`]: the exact derivatives of the steps.
 
-use lnn::lagrangian::build;
+use lnn::lagrangian::SystemInstance;
 use lnn::rollout::Flow;
 use nalgebra::{SMatrix, SVector};
 use rand::SeedableRng;
@@ -15,7 +15,7 @@ const NOISE: f64 = 0.02;
 const INTERVAL: f64 = 0.02;
 
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let arm = build::<f64>("double-pendulum", &[])?;
+    let arm = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
     let flow = Flow::new(&*arm, INTERVAL, 1);
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let noise = Normal::new(0.0, NOISE)?;

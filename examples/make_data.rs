@@ -3,7 +3,7 @@
 //! Four runs of five seconds, friction in both joints, angles 100 times a second with a noise of 0.5 % of their rms.
 //! Without arguments it compares the file with what it would write; `-- --write` writes it.
 
-use lnn::lagrangian::{Dissipation, Rayleigh, WithForces, configure};
+use lnn::lagrangian::{Dissipation, Rayleigh, SystemInstance, WithForces};
 use lnn::random::RngStream;
 use lnn::rollout::{RolloutOptions, rollout};
 use lnn::scalar::Real;
@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// The recording as CSV.
 pub fn made() -> Result<String, Box<dyn std::error::Error>> {
     // 1 m and 1 kg each, g = 9.81 m/s^2; anything that gives accelerations can be rolled out.
-    let ideal = configure::<f64>("double-pendulum", &[("g".to_string(), "9.81".to_string())])?.build()?;
+    let ideal = SystemInstance::<f64>::named("double-pendulum", &[("g".to_string(), "9.81".to_string())])?.build()?;
     let model = WithForces::new(ideal, Rayleigh(Joints([0.08, 0.05])));
     let (mut csv, mut rng) = ("run,t,theta1,theta2\n".to_string(), RngStream::Training(0).generator(0));
     for (run, start) in [[1.2, 1.9], [-2.0, -0.6], [2.4, 0.3], [0.4, -2.6]].into_iter().enumerate() {

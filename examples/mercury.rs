@@ -7,7 +7,7 @@
 //! pulls as a recording for `lnn identify`. Without files it makes an orbit of its own and compares what it finds with the truth.
 
 use lnn::identification::{Between, Identified, IdentifyOptions, identify};
-use lnn::lagrangian::{SystemInstance, configure_system};
+use lnn::lagrangian::SystemInstance;
 use lnn::pipeline::parse_system;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Driven, RolloutOptions};
@@ -63,7 +63,7 @@ pub fn main() -> Outcome<()> {
 fn sun(given: &[(&str, f64)]) -> Outcome<SystemInstance<f64>> {
     let system = parse_system(FORM).map_err(|(line, problem)| format!("{line}: {problem}"))?;
     let given: Vec<(String, String)> = given.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-    Ok(configure_system(Cow::Owned(system), &given)?)
+    Ok(SystemInstance::new(Cow::Owned(system), &given)?)
 }
 
 /// Mercury's positions in AU with the pulls on it, over days from the first row.

@@ -3,13 +3,17 @@
 //! A batch is row-major, `(batch, n)`; a nalgebra matrix is column-major. A matrix with one state per column therefore is
 //! a batch as it lies in memory, and a symmetric mass matrix is the same in both orders: nothing is transposed.
 
-use lnn::lagrangian::{Request, Terms, build};
+use lnn::lagrangian::{Request, SystemInstance, Terms};
 use nalgebra::{DMatrix, DMatrixView, SMatrix, SVector};
 
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [m1, m2, l1, l2]: [f64; 4] = [1.2, 0.7, 0.9, 1.1];
     let values = [("m1", m1), ("m2", m2), ("l1", l1), ("l2", l2), ("g", 9.81)];
-    let model = build::<f64>("double-pendulum", &values.map(|(name, value)| (name.to_string(), value.to_string())))?;
+    let model = SystemInstance::<f64>::named(
+        "double-pendulum",
+        &values.map(|(name, value)| (name.to_string(), value.to_string())),
+    )?
+    .build()?;
     let mut terms = Terms::default();
 
     // One state of fixed size: M, and the acceleration by nalgebra's own solver.

@@ -5,8 +5,8 @@ use argmin::solver::conjugategradient::{NonlinearConjugateGradient, beta::PolakR
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::lagrangian::configure;
-use lnn::network::{Initialization, initial_weights};
+use lnn::lagrangian::SystemInstance;
+use lnn::network::Initialization;
 use lnn::optimizers::{Method, Update};
 use lnn::presets::Preset;
 use lnn::random::RngStream;
@@ -55,10 +55,10 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
         Dataset::new(1, q, spread(0.414).map(|x| 6.0 * x).collect(), a)
     };
     let (training, validation) = (states(256, 0.0)?, states(100, 0.3)?);
-    let mut config = Preset::Quick.config(&configure("harmonic-oscillator", &[])?).ok_or("no preset")?;
+    let mut config = Preset::Quick.config(&SystemInstance::named("harmonic-oscillator", &[])?).ok_or("no preset")?;
     config.network.hidden = vec![16];
     let architecture = config.architecture_with(["q"].into_iter(), vec![true], training.physical_scale())?;
-    let start: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut RngStream::Weights.generator(1));
+    let start: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut RngStream::Weights.generator(1));
     let problem = || -> Result<_, TrainingError> {
         let objective = Objective::new(&architecture, Penalty::None, 2)?;
         Ok(TrainingProblem::new(objective, &training, &validation, 0.0))

@@ -3,7 +3,7 @@
 //! Each of 60 intervals has a constant torque on either joint. A sweep backwards over the linearized motion improves them, with a feedback
 //! that holds the motion near its plan (Li and Todorov 2004). The plan is made with the learned model and tried on the exact system.
 
-use lnn::lagrangian::{EulerLagrange, build};
+use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::network::{ModelFile, NetworkLagrangian};
 use lnn::rollout::Flow;
 use nalgebra::{SMatrix, SVector};
@@ -111,7 +111,7 @@ pub fn main() -> Result<(), Failure> {
     let effort = plan.torques.iter().map(|u| u.amax()).fold(0.0, f64::max);
 
     // Motion tells L up to a factor, and torques in its unit: one known mass gives the factor.
-    let exact = build::<f64>("double-pendulum", &[])?;
+    let exact = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
     let at = [[1.0, 0.5], [0.0, 0.0]];
     let [own, true_one] = [&learned as &dyn EulerLagrange<f64>, &*exact].map(|m| m.mass_matrix(&at[0], &at[1]));
     let factor = own?[0] / true_one?[0];

@@ -19,9 +19,9 @@
 //!
 //! | to | use |
 //! |---|---|
-//! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::systems()`] |
+//! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::System::all`] |
 //! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
-//! | compute the metric, connection and curvature at a point | [`geometry::geometries`] |
+//! | compute the metric, connection and curvature at a point | [`geometry::Geometry::of`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |
 //! | learn from accelerations | [`presets::Trainer`] (your own [`data::Dataset`]), [`training::run`] (a configuration) |
 //! | learn from recorded motion | `pipeline::Fit` (feature `pipeline`) |
@@ -36,12 +36,12 @@
 //! | differentiate the end of a motion, by start, force and parameters | [`rollout::Flow`] |
 //! | solve small symmetric systems in batches | [`linalg`] |
 //! | put constraints beside a Lagrangian, find those that recorded motion obeys | [`lagrangian::Constrained`], [`constraints`] |
-//! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::symmetries`], [`symmetry::quadratic`], [`symmetry::compare`] |
+//! | find what a Lagrangian conserves, compare two Lagrangians | [`symmetry::Symmetries::find`], [`symmetry::Quadratic::find`], [`symmetry::Comparison::of`] |
 //! | read a Lagrangian as a formula, from motion or from a model | [`formula`] |
 //! | find the constants of a Lagrangian whose form is known | [`identification`] |
-//! | read a system of your own from its file | `pipeline::parse_system` (feature `pipeline`), [`lagrangian::configure_system`] |
+//! | read a system of your own from its file | `pipeline::parse_system` (feature `pipeline`), [`lagrangian::SystemInstance::new`] |
 //! | draw random numbers that a seed repeats | [`random`] |
-//! | see the shadow of a black hole and the sky around it | [`relativity::shadow()`], [`relativity::outline`] |
+//! | see the shadow of a black hole and the sky around it | [`relativity::Shadow::of`], [`relativity::Outline::of`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | test a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //! | end a long search, or see how far it is | [`cancellation::Cancellation`] |
@@ -94,11 +94,11 @@
 //! # Motion
 //!
 //! ```
-//! use lnn::lagrangian::build;
+//! use lnn::lagrangian::SystemInstance;
 //! use lnn::prelude::*;
 //! use lnn::rollout::Integrator;
 //!
-//! let model = build::<f64>("double-pendulum", &[("m2".to_string(), "0.5".to_string())])?;
+//! let model = SystemInstance::<f64>::named("double-pendulum", &[("m2".to_string(), "0.5".to_string())])?.build()?;
 //! let motion = model.rollout(&[2.0, 1.0], &[0.0, 0.0], 5.0, 0.1)?; // 5 s, a sample every 0.1 s
 //! assert_eq!(motion.t.len(), 51);
 //!
@@ -112,11 +112,11 @@
 //! # Learning
 //!
 //! ```
-//! use lnn::lagrangian::configure;
-//! use lnn::training::{Hooks, run};
+//! use lnn::lagrangian::SystemInstance;
 //! use lnn::presets::Preset;
+//! use lnn::training::{Hooks, run};
 //!
-//! let system = configure::<f64>("harmonic-oscillator", &[])?;
+//! let system = SystemInstance::<f64>::named("harmonic-oscillator", &[])?;
 //! let mut config = Preset::Quick.config(&system).unwrap();
 //! config.network.hidden = vec![8]; // as small as can be: this runs in a moment
 //! (config.data.training, config.data.validation, config.data.test) = (256, 64, 64);

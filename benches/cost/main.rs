@@ -15,8 +15,8 @@ mod turns;
 use clap::Parser;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::lagrangian::{EulerLagrange, Request, Terms, configure};
-use lnn::network::{Architecture, Initialization, NetworkLagrangian, initial_weights};
+use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
+use lnn::network::{Architecture, Initialization, NetworkLagrangian};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::rollout::{rollout_many, rollout_together};
 use lnn::scalar::Scalar;
@@ -59,7 +59,7 @@ impl<S: Scalar> Setup<S> {
     fn new(n: usize, width: usize, alpha: f64) -> Self {
         let architecture = architecture(n, width, alpha);
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let weights = initial_weights(&architecture, Initialization::Default, &mut rng);
+        let weights = architecture.initial_weights(Initialization::Default, &mut rng);
         let mut draw = || (0..BATCH * n).map(|_| S::of_f64(rng.random_range(-10.0..10.0))).collect();
         let data = Dataset::new(n, draw(), draw(), draw()).expect("finite numbers");
         Self { architecture, weights, data, rows: (0..BATCH as u32).collect() }
@@ -277,7 +277,7 @@ fn main() {
 
 /// Evaluates one state within the bounds of a system, its acceleration and all its terms.
 fn repeat(name: &str, count: usize) {
-    let configured = configure::<f64>(name, &[]).expect("a system of the catalogue");
+    let configured = SystemInstance::<f64>::named(name, &[]).expect("a system of the catalogue");
     let bounds = configured.system.validation(configured.coordinates);
     let within =
         |bounds: &[(f64, f64)]| -> Vec<f64> { bounds.iter().map(|(low, high)| low + 0.37 * (high - low)).collect() };

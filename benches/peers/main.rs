@@ -12,7 +12,7 @@ mod recipe;
 
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::network::{Architecture, Initialization, initial_weights};
+use lnn::network::{Architecture, Initialization};
 use lnn::scalar::Scalar;
 use lnn::training::Objective;
 use networks::{SCALE, architecture};
@@ -86,7 +86,7 @@ fn setup(words: &[&str]) -> Outcome<Box<dyn Timed>> {
     let (n, width, batch): (usize, usize, usize) = (n.parse()?, width.parse()?, batch.parse()?);
     let architecture = architecture(n, width, alpha.parse()?);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut rng);
     let mut draw = || (0..batch * n).map(|_| rng.random_range(-SCALE..SCALE)).collect::<Vec<f64>>();
     let states = [draw(), draw(), draw()];
     let mut judge = Case::<f64>::new(&architecture, &weights, &states)?;

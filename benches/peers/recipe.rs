@@ -1,9 +1,8 @@
 //! What the paper's training of the double pendulum starts from, for a peer: scaled states, weights, settings.
 
 use super::{Outcome, write};
-use lnn::data::{Dataset, sample_all};
-use lnn::lagrangian::configure;
-use lnn::network::initial_weights;
+use lnn::data::{Dataset, Datasets};
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use lnn::random::RngStream;
 use std::path::Path;
@@ -11,10 +10,10 @@ use std::path::Path;
 /// Writes states `NAME.x`, `.w`, `.a` (positions, velocities, accelerations in units of the scales), `weights` and
 /// `recipe.json`; at most `states` training states.
 pub fn write_all(directory: &Path, states: usize) -> Outcome<()> {
-    let system = configure::<f64>("double-pendulum", &[])?;
+    let system = SystemInstance::<f64>::named("double-pendulum", &[])?;
     let mut config = Preset::Paper.config(&system).ok_or("the paper has a double pendulum")?;
     config.data.training = config.data.training.min(states);
-    let (data, scale) = sample_all::<f64>(&config, &system)?;
+    let (data, scale) = Datasets::<f64>::sample(&config, &system)?;
     let architecture = config.architecture(&system, scale.clone())?;
     let scaled = |x: &[f64]| -> Vec<f64> {
         x.chunks(scale.len()).flat_map(|row| row.iter().zip(&scale).map(|(x, s)| x / s)).collect()
@@ -30,7 +29,7 @@ pub fn write_all(directory: &Path, states: usize) -> Outcome<()> {
     }
     set("validation", &data.validation)?;
     let mut rng = RngStream::Weights.generator(config.seed);
-    write(directory, "weights", &initial_weights::<f64>(&architecture, config.network.initialization, &mut rng))?;
+    write(directory, "weights", &architecture.initial_weights::<f64>(config.network.initialization, &mut rng))?;
     let phase = |p: &lnn::configuration::Phase| serde_json::json!({ "epochs": p.epochs, "rate": p.rate, "eta_min": p.eta_min, "t_max": p.t_max });
     let recipe = serde_json::json!({
         "n": architecture.coordinates,

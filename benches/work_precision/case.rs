@@ -4,9 +4,7 @@ use super::super::common::nested::reference;
 use super::super::common::{accuracy::cast, of_scalar, solve};
 use lnn::data::Dataset;
 use lnn::lagrangian::Lagrangian;
-use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
-};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian};
 use lnn::scalar::{Real, Scalar};
 use lnn::tape::ScalarFunction;
 use rand::{Rng, SeedableRng};
@@ -43,7 +41,7 @@ impl Case {
             form: Form::default(),
         };
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let weights = initial_weights(&architecture, Initialization::Default, &mut rng);
+        let weights = architecture.initial_weights(Initialization::Default, &mut rng);
         let mut draw = || (0..batch * n).map(|_| rng.random_range(-REACH..REACH) as f32).collect();
         let (q, v, targets) = (draw(), draw(), draw());
         Self { n, width, batch, architecture, weights, q, v, targets }

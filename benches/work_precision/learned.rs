@@ -2,8 +2,8 @@
 
 use super::options::Options;
 use lnn::configuration::{Config, Precision};
-use lnn::lagrangian::configure;
-use lnn::network::{FORMAT, Header, ModelFile, NetworkLagrangian, StoredPrecision};
+use lnn::lagrangian::SystemInstance;
+use lnn::network::{Header, ModelFile, NetworkLagrangian, StoredPrecision};
 use lnn::presets::Preset;
 use lnn::training::{Hooks, run};
 use std::path::Path;
@@ -29,7 +29,7 @@ pub fn double_pendulum(options: &Options) -> Result<NetworkLagrangian<f64>, Stri
 
 /// The quick preset with fewer epochs and states.
 fn train(epochs: usize, states: usize, path: &Path) -> Result<(), String> {
-    let system = configure::<f64>("double-pendulum", &[]).map_err(|e| e.to_string())?;
+    let system = SystemInstance::<f64>::named("double-pendulum", &[]).map_err(|e| e.to_string())?;
     let mut config: Config = Preset::Quick.config(&system).ok_or("the quick preset has no double pendulum")?;
     config.data.training = states;
     for phase in &mut config.phases {
@@ -39,7 +39,7 @@ fn train(epochs: usize, states: usize, path: &Path) -> Result<(), String> {
     let outcome = run::<f32>(&config, threads, &Hooks::default()).map_err(|e| e.to_string())?;
     let symbols = system.system.parameters.iter().map(|p| p.symbol.to_string());
     let header = Header {
-        format: FORMAT,
+        format: Header::FORMAT,
         crate_version: env!("CARGO_PKG_VERSION").to_string(),
         architecture: outcome.model.architecture().clone(),
         system: config.system.clone(),

@@ -2,7 +2,7 @@
 //! configuration.
 
 use lnn::configuration::Config;
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn_cli::parse_config;
 
 /// Reads the bytes.
@@ -16,7 +16,7 @@ pub fn run(bytes: &[u8]) {
         }
     };
     let given: Vec<(String, String)> = config.parameters.iter().map(|(s, x)| (s.clone(), x.to_string())).collect();
-    let Ok(system) = configure::<f64>(&config.system, &given) else { return };
+    let Ok(system) = SystemInstance::<f64>::named(&config.system, &given) else { return };
     if config.validate(system.coordinates).is_err() {
         return;
     }

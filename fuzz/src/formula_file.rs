@@ -1,8 +1,8 @@
 //! The formula that is found of a random polynomial Lagrangian of one coordinate: its system file is read, and moves as the Lagrangian.
 
 use super::bytes::Bytes;
-use lnn::formula::{FormulaOptions, formula_of_model};
-use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, configure_system};
+use lnn::formula::{FormulaOptions, FoundFormula};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, SystemInstance};
 use lnn::pipeline::parse_system;
 use std::borrow::Cow;
 
@@ -26,9 +26,9 @@ pub fn run(bytes: &[u8]) {
         bootstraps: 1,
         ..FormulaOptions::default()
     };
-    let Ok(found) = formula_of_model(&model, (&names, &[false]), (&q, &v), &options) else { return };
+    let Ok(found) = FoundFormula::of_model(&model, (&names, &[false]), (&q, &v), &options) else { return };
     let system = parse_system(&found.system_file("found")).expect("the file of a formula is one of a system");
-    let again = configure_system::<f64>(Cow::Owned(system), &[]).expect("its constants are in range");
+    let again = SystemInstance::<f64>::new(Cow::Owned(system), &[]).expect("its constants are in range");
     let again = again.build().expect("and it moves");
     let (one, other) = (model.acceleration(&q, &v).expect("mass"), again.acceleration(&q, &v).expect("mass"));
     let size = one.iter().fold(1e-3, |most: f64, a| most.max(a.abs()));

@@ -1,7 +1,7 @@
 //! Any text as the file of a system of two coordinates: its page computes what the library computes, and has no acceleration where that has
 //! none. Without node nothing is compared.
 
-use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms, configure_system};
+use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use lnn::network::{ModelFile, NetworkLagrangian};
 use lnn::pipeline::parse_system;
 use lnn::report::page;
@@ -30,7 +30,7 @@ console.log(JSON.stringify(exact ? JSON.parse(process.argv[1]).map(of) : []));
 pub fn run(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     let Ok(system) = parse_system(text) else { return };
-    let Ok(system) = configure_system::<f64>(Cow::Owned(system), &[]) else { return };
+    let Ok(system) = SystemInstance::<f64>::new(Cow::Owned(system), &[]) else { return };
     let (2, Ok(built)) = (system.coordinates, system.build()) else { return };
     let ModelFile { header, weights } = ModelFile::<f64>::from_bytes(MODEL).expect("the shipped model");
     let network = NetworkLagrangian::new(header.architecture.clone(), weights).expect("its weights");

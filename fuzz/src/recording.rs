@@ -1,7 +1,7 @@
 //! Any bytes as a file of recorded motion, CSV, XLSX, NPY or NPZ: refused with an error of one line, or trajectories of finite
 //! numbers at increasing times.
 
-use lnn::recording::{Columns, read_recording};
+use lnn::recording::{Columns, LoadedRecording};
 use std::path::PathBuf;
 
 /// Reads the bytes as columns with names, by number, with everything that can be asked for, and as trajectories side by side.
@@ -29,7 +29,7 @@ pub fn run(bytes: &[u8]) {
 }
 
 fn read(path: &PathBuf, columns: &Columns) {
-    let reading = match read_recording(&[path], columns) {
+    let reading = match LoadedRecording::read(&[path], columns) {
         Ok(reading) => reading,
         Err(error) => return assert_eq!(error.to_string().lines().count(), 1, "{error:?}"),
     };

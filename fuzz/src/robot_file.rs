@@ -1,7 +1,7 @@
 //! Any text as the file of a robot: refused with a line and a message, or a system whose description is written back as the same one; and the
 //! same text if it is written with the constants that it has.
 
-use lnn::lagrangian::configure_system;
+use lnn::lagrangian::SystemInstance;
 use lnn::pipeline::parse_system;
 use lnn::pipeline::{parse_robot, rewrite_robot};
 use std::borrow::Cow;
@@ -20,7 +20,7 @@ pub fn run(bytes: &[u8]) {
     let written = toml::to_string(&description).expect("a description can be written");
     let again = parse_system(&written).expect("and read again");
     assert_eq!(again.with_defaults(&[]).as_ref(), Some(&description));
-    let configured = configure_system::<f64>(Cow::Owned(system), &[]).expect("the defaults are in range");
+    let configured = SystemInstance::<f64>::new(Cow::Owned(system), &[]).expect("the defaults are in range");
     let symbols: Vec<String> = configured.system.parameters.iter().map(|known| known.symbol.to_string()).collect();
     let same: Vec<(&str, f64)> =
         symbols.iter().map(String::as_str).zip(configured.parameters.iter().copied()).collect();

@@ -1,7 +1,7 @@
 //! Any text as the file of a system: refused with a line and a message, or a system whose description is written back as
 //! the same one and whose Lagrangian is the same in a batch and for one state.
 
-use lnn::lagrangian::{EulerLagrange, Request, Terms, configure_system};
+use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use lnn::pipeline::parse_system;
 use std::borrow::Cow;
 
@@ -21,7 +21,7 @@ pub fn run(bytes: &[u8]) {
     assert_eq!(again.description().expect("as before"), description);
     let n = system.size.default();
     assert_eq!(system.columns(n).len(), 2 * n);
-    let configured = configure_system::<f64>(Cow::Owned(system), &[]).expect("the defaults are in range");
+    let configured = SystemInstance::<f64>::new(Cow::Owned(system), &[]).expect("the defaults are in range");
     // Constraints may contradict each other, or leave no motion: that is known where states are.
     let constrained = !again.description().expect("as before").constraints.is_empty();
     let value: Box<dyn EulerLagrange<f64>> = match configured.build() {

@@ -4,9 +4,9 @@ use crate::attend::left;
 use crate::errors::{runtime, value};
 use crate::readings::shown;
 use crate::subject::{Subject, degrees_of};
-use lnn::geometry::{Change, surfaces};
+use lnn::geometry::{Change, Surface};
 use lnn::lagrangian::Interruptible;
-use lnn::symmetry::{Basis, ComparisonSummary, compare, enough, most_states, unknowns};
+use lnn::symmetry::{Basis, ComparisonSummary, Comparison, enough, most_states, unknowns};
 use pyo3::prelude::*;
 
 /// What two Lagrangians of the same coordinates have in common beyond factor and gauge, as JSON.
@@ -45,7 +45,7 @@ pub fn compare_lagrangians(
         let (a, b) = (first.get(), second.get());
         let (q, v) = a.sampled_beside(b, &region, points, seed)?;
         let [a, b] = [a, b].map(|subject| Interruptible::new(subject.moving(), &watch.interrupt));
-        compare(&a, &b, &basis, (&q, &v)).map_err(runtime)
+        Comparison::of(&a, &b, &basis, (&q, &v)).map_err(runtime)
     })??;
     let [first, second] = names;
     let summary = ComparisonSummary { first, second, comparison, points, seed };
@@ -62,7 +62,7 @@ pub fn surfaces_of_metric(
     steps: usize,
 ) -> PyResult<Vec<(Vec<f64>, &'static str)>> {
     subject.require_free()?;
-    let found = surfaces(subject.moving(), &block, (&ends.0, &ends.1), &velocity, steps).map_err(value)?;
+    let found = Surface::find(subject.moving(), &block, (&ends.0, &ends.1), &velocity, steps).map_err(value)?;
     let word = |change| match change {
         Change::Zero => "zero",
         Change::Pole => "pole",

@@ -161,7 +161,7 @@ pub fn sweep(
     let parsed = configurations.into_iter().map(|(choice, text)| Ok((choice, serde_json::from_str(&text)?)));
     let parsed: Vec<(Vec<(String, String)>, Config)> =
         parsed.collect::<Result<_, serde_json::Error>>().map_err(value)?;
-    let swept = attended(py, progress.as_ref(), |watch| lnn::pipeline::sweep(parsed, plan, (&out.0, out.1), &watch))?;
+    let swept = attended(py, progress.as_ref(), |watch| lnn::pipeline::Sweep::run(parsed, plan, (&out.0, out.1), &watch))?;
     let Swept { rows, finished, findings } = swept.map_err(pipeline)?;
     Ok((serde_json::to_string(&rows).map_err(runtime)?, said(&findings), finished))
 }

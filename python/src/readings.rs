@@ -4,9 +4,9 @@ use crate::attend::whole;
 use crate::errors::{pipeline, runtime, value};
 use crate::recorded::{Motion, Source};
 use crate::subject::Subject;
-use lnn::constraints::{ConstraintSearch, MotionSamples, find_constraints};
+use lnn::constraints::{ConstraintSearch, MotionSamples, FoundConstraints};
 use lnn::findings::Findings;
-use lnn::formula::{Families, FormulaOptions, FoundFormula, MOST_BOOTSTRAPS, formula_of_motion};
+use lnn::formula::{Families, FormulaOptions, FoundFormula, MOST_BOOTSTRAPS};
 use lnn::identification::{Between, IdentifyOptions, identify as identified};
 use lnn::pipeline::{FirstLook, NextStep};
 use lnn::recording::SmoothOptions;
@@ -57,7 +57,7 @@ pub fn constraints_of_motion(py: Python<'_>, motion: Motion, degrees: (usize, us
         let recording = source.read()?.recording;
         let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(value)?;
         let samples = samples.watched(&watch.cancellation());
-        let found = find_constraints(&samples, ConstraintSearch { degree, velocity_degree }).map_err(value)?;
+        let found = FoundConstraints::of(&samples, ConstraintSearch { degree, velocity_degree }).map_err(value)?;
         shown(&found, &found.findings())
     })?
 }
@@ -74,7 +74,7 @@ pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String
         if let Some(noise) = options.noise.as_ref().filter(|noise| noise.len() != n) {
             return Err(value(format_args!("noise: expected {n} numbers, found {}", noise.len())));
         }
-        formula_shown(&formula_of_motion(&recording, &options).map_err(value)?, &name)
+        formula_shown(&FoundFormula::of_motion(&recording, &options).map_err(value)?, &name)
     })?
 }
 

@@ -3,8 +3,8 @@
 use crate::errors::{pipeline, value};
 use lnn::pipeline::PipelineError;
 use lnn::recording::{
-    ColumnGuess, Columns, DataError, Guess, LoadedRecording, RecordedTrajectory, Recording, factor, guess,
-    read_recording,
+    ColumnGuess, Columns, DataError, Guess, LoadedRecording, RecordedTrajectory, Recording, factor, 
+    
 };
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -95,7 +95,7 @@ impl Source {
     pub fn read(self) -> PyResult<LoadedRecording> {
         match self {
             Self::Memory(recording) => Ok(recording.into()),
-            Self::Files(files, columns) => read_recording(&files, &columns).map_err(refused),
+            Self::Files(files, columns) => LoadedRecording::read(&files, &columns).map_err(refused),
         }
     }
 
@@ -118,7 +118,7 @@ impl Source {
             Self::Files(files, columns) => {
                 let mut found = Guess { columns: *columns, table: Vec::new() };
                 if found.columns.coords.is_empty() {
-                    found = guess(&files, &found.columns).map_err(refused)?;
+                    found = Guess::of(&files, &found.columns).map_err(refused)?;
                 }
                 let loaded = found.read(&files).map_err(refused)?;
                 let names: Vec<_> = files.iter().map(|file| quoted(&file.display().to_string())).collect();

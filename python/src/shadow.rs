@@ -5,7 +5,7 @@ use crate::errors::{choice, value};
 use crate::readings::shown;
 use crate::subject::Subject;
 use lnn::pipeline::Event;
-use lnn::relativity::{Camera, Chart, NamedMetric, Observer, ShadowSummary, Tracing, picture, time_moves_alone, views};
+use lnn::relativity::{Camera, Chart, NamedMetric, Observer, ShadowSummary, Tracing, time_moves_alone, View};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -100,12 +100,12 @@ pub fn shadow<'py>(
             }
         };
         let looking = (&camera, &tracing, choices.edges);
-        let views = views(&metrics, looking, &watch.interrupt, &|_| (), &advance).map_err(value)?;
+        let views = View::of(&metrics, looking, &watch.interrupt, &|_| (), &advance).map_err(value)?;
         let free = metrics.iter().any(|(_, model)| time_moves_alone(*model, camera.chart, camera.distance));
         let about = (last.name(), unit.as_deref());
         let summary =
             ShadowSummary::of(about, (&camera, &tracing), &views, free && learned.is_some()).map_err(value)?;
-        Ok::<_, PyErr>((shown(&summary, &summary.findings(None))?, picture(&camera, &views).map_err(value)?))
+        Ok::<_, PyErr>((shown(&summary, &summary.findings(None))?, camera.picture(&views).map_err(value)?))
     })??;
     Ok((json, PyBytes::new(py, image.pixels.as_flattened()), (image.height, image.width)))
 }

@@ -4,19 +4,19 @@ use crate::attend::{left, whole};
 use crate::errors::{pipeline, runtime, value};
 use crate::forces::{Forces, Samples};
 use crate::readings::{FormulaChoices, formula_shown, shown};
-use lnn::certificate::{Certificate, CertificateOptions, Signature, certify_network, certify_system};
+use lnn::certificate::{Certificate, CertificateOptions, Signature};
 use lnn::constraints::{EXAMINED_STATES, examine};
-use lnn::formula::{MODEL_STATES, formula_of_model};
-use lnn::geometry::{Geometry, GeometryError, geometries};
+use lnn::formula::{MODEL_STATES, FoundFormula};
+use lnn::geometry::{Geometry, GeometryError};
 use lnn::lagrangian::{Bounds, Size};
 use lnn::lagrangian::{
     Description, EulerLagrange, Frictionless, Interruptible, Linearization, Linearizer, MechanicsError, Request,
-    SystemInstance, Terms, configure, configure_system, configure_values, constrained_systems, find,
+    SystemInstance, Terms, constrained_systems, System,
 };
 use lnn::linalg::Workspace;
 use lnn::network::{Header, ModelFile, NetworkLagrangian};
 use lnn::pipeline::{
-    CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, evaluate, parse_robot, rewrite_robot, trained_on,
+    CONSTRAINTS_UNSUPPORTED, EvaluationOptions, Watch, Evaluation, parse_robot, rewrite_robot, trained_on,
 };
 use lnn::report::page;
 use lnn::rollout::{Event, Integrator, Occurrence, Rollout, RolloutError, RolloutOptions, Start, rollout_each};
@@ -56,10 +56,10 @@ pub struct Subject {
 /// All systems of the catalogue, as JSON.
 #[pyfunction]
 pub fn systems() -> PyResult<String> {
-    let free = lnn::lagrangian::systems().iter().map(Cow::Borrowed);
+    let free = lnn::lagrangian::System::all().iter().map(Cow::Borrowed);
     let all: PyResult<Vec<Value>> = free
         .chain(constrained_systems().into_iter().map(Cow::Owned))
-        .map(|system| Ok(Subject::of(configure_system(system, &[]).map_err(value)?)?.summary()))
+        .map(|system| Ok(Subject::of(SystemInstance::new(system, &[]).map_err(value)?)?.summary()))
         .collect();
     Ok(Value::from(all?).to_string())
 }
@@ -142,12 +142,12 @@ impl Subject {
         };
         let system = match &header.description {
             Some(description) => description.system().map(Cow::Owned).map_err(value)?,
-            None => Cow::Borrowed(find(&header.system).map_err(|_| {
+            None => Cow::Borrowed(System::named(&header.system).map_err(|_| {
                 let problem = "is no system of the catalogue: give the system to compare with";
                 value(format_args!("{:?}, which the model learned, {problem}", header.system))
             })?),
         };
-        configure_values(system, &header.parameters).map_err(value)
+        SystemInstance::with_values(system, &header.parameters).map_err(value)
     }
 
     fn time_like(&self) -> Option<usize> {
@@ -430,7 +430,7 @@ impl Subject {
     /// A system of the catalogue.
     #[staticmethod]
     fn system(name: &str, parameters: Vec<(String, String)>) -> PyResult<Self> {
-        Self::of(configure(name, &parameters).map_err(value)?)
+        Self::of(SystemInstance::named(name, &parameters).map_err(value)?)
     }
 
     /// A system by its description: TOML, or JSON.
@@ -439,7 +439,7 @@ impl Subject {
         let description: Description =
             if json { serde_json::from_str(text).map_err(value)? } else { toml::from_str(text).map_err(value)? };
         let system = Cow::Owned(description.system().map_err(value)?);
-        Self::of(configure_system(system, &parameters).map_err(value)?)
+        Self::of(SystemInstance::new(system, &parameters).map_err(value)?)
     }
 
     /// A model from the bytes of its file.
@@ -635,7 +635,7 @@ impl Subject {
             let mut found = Geometries::default();
             let chunks = points.chunks(GEOMETRY_CHUNK * n);
             for points in chunks.take_while(|_| !watch.interrupt.load(Ordering::Relaxed)) {
-                geometries(model, points, &velocity)?.into_iter().for_each(|one| found.push(n, one));
+                Geometry::of(model, points, &velocity)?.into_iter().for_each(|one| found.push(n, one));
             }
             Ok::<_, GeometryError>(found)
         })?;
@@ -700,7 +700,7 @@ impl Subject {
         whole(py, None, |watch| {
             options.cancellation = watch.cancellation();
             let (q, v) = self.sampled(&self.interest(), MODEL_STATES, options.seed)?;
-            let found = formula_of_model(self.moving(), (names, &periodic), (&q, &v), &options).map_err(value)?;
+            let found = FoundFormula::of_model(self.moving(), (names, &periodic), (&q, &v), &options).map_err(value)?;
             formula_shown(&found, &name)
         })?
     }
@@ -734,8 +734,8 @@ impl Subject {
             (options.condition, options.seconds, options.boxes) = (condition, seconds, boxes);
             (options.threads, options.stop) = (threads, Some(watch.interrupt.as_ref()));
             match &self.kind {
-                Kind::System(configured, _) => certify_system(configured, &region, &options),
-                Kind::Model(_, network, _) => certify_network(network, &region, &options),
+                Kind::System(configured, _) => Certificate::of_system(configured, &region, &options),
+                Kind::Model(_, network, _) => Certificate::of_network(network, &region, &options),
             }
         })?
         .map_err(value)?;
@@ -766,7 +766,7 @@ impl Subject {
         // A system that is described in the model's file is the one whose constraints it was learned under.
         options.constraints = header.description.is_none().then(|| header.constraints.clone());
         (options.starts, options.threads) = (starts, threads);
-        let found = whole(py, progress.as_ref(), |watch| evaluate(&system, network, options, watch))?;
+        let found = whole(py, progress.as_ref(), |watch| Evaluation::of(&system, network, options, watch))?;
         serde_json::to_string(&found.map_err(pipeline)?).map_err(runtime)
     }
 }

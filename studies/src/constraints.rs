@@ -11,13 +11,13 @@ mod networks;
 
 use lnn::analysis::mass_matrix_error_within;
 use lnn::configuration::Penalty;
-use lnn::constraints::{ConstraintSearch, FoundConstraints, MotionSamples, find_constraints};
+use lnn::constraints::{ConstraintSearch, FoundConstraints, MotionSamples};
 use lnn::data::Dataset;
 use lnn::lagrangian::{
     Constrained, Constraints, EulerLagrange, ExpressionConstraints, ManifoldRows, Mechanics, Request, SystemInstance,
-    Terms, configure, project,
+    Terms, project,
 };
-use lnn::network::{Initialization, Structure, initial_weights};
+use lnn::network::{Initialization, Structure};
 use lnn::presets::Trainer;
 use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions};
 use lnn::rollout::{Integrator, RolloutOptions, rollout};
@@ -68,7 +68,7 @@ const SPHERE: &str = "sphere";
 fn configured(name: &str) -> SystemInstance<f64> {
     let weightless = [("g".to_string(), "0".to_string())];
     let (name, given) = if name == SPHERE { ("particle-on-sphere", &weightless[..]) } else { (name, &[][..]) };
-    configure(name, given).expect("the values are valid")
+    SystemInstance::named(name, given).expect("the values are valid")
 }
 
 fn model(name: &str) -> Box<dyn EulerLagrange<f64>> {
@@ -144,7 +144,7 @@ fn recorded(name: &str, motions: usize, seconds: f64, noise: f64, seed: u64) -> 
 /// What was found, of a recording whose velocities are looked at if a constraint is linear in them.
 fn search(recording: &Recording, degree: usize) -> FoundConstraints {
     let samples = MotionSamples::of(recording, &SmoothOptions::default()).expect("long trajectories");
-    find_constraints(&samples, ConstraintSearch { degree, velocity_degree: 1 }).expect("enough samples")
+    FoundConstraints::of(&samples, ConstraintSearch { degree, velocity_degree: 1 }).expect("enough samples")
 }
 
 /// Largest distance of exact states from a found constraint, over the size of the coordinates.
@@ -489,7 +489,7 @@ fn cost(rounds: usize, count: usize) {
     let rows: Vec<u32> = (0..data.len() as u32).collect();
     let mut objective = Objective::<f64>::new(&architecture, Penalty::None, 1).expect("one thread");
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut rng);
     let mut gradient = vec![0.0; weights.len()];
     let free = time(rounds, || _ = objective.step(&weights, &data, &rows, &mut gradient));
     let constrained = time(rounds, || _ = objective.step(&weights, &under, &rows, &mut gradient));

@@ -12,7 +12,7 @@ mod arms;
 use crate::setups::configured;
 use crate::{ARMS, Outcome, ROOT};
 use lnn::identification::{Between, Identified, IdentifyOptions, identify};
-use lnn::lagrangian::{SystemInstance, configure};
+use lnn::lagrangian::SystemInstance;
 use lnn::prelude::*;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
@@ -39,7 +39,7 @@ const PENDULUM: [(&str, f64); 3] = [("m2", 0.6), ("l1", 0.8), ("l2", 1.3)];
 /// Four runs of 3 s at 50 Hz, noise of 2 and 3 mrad: the constants with their errors.
 fn pendulum(seed: u64) -> Outcome<Identified> {
     let given: Vec<(String, String)> = PENDULUM.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-    let model = configure::<f64>("double-pendulum", &given)?.build()?;
+    let model = SystemInstance::<f64>::named("double-pendulum", &given)?.build()?;
     let mut rng = RngStream::Trajectories.generator(seed);
     let mut tracks = Vec::new();
     for start in [[1.2, 1.9, 0.0, 0.0], [-0.8, 0.4, 1.0, -2.0], [2.0, -0.5, 0.0, 1.0], [0.3, -1.4, -2.0, 0.0]] {
@@ -50,7 +50,7 @@ fn pendulum(seed: u64) -> Outcome<Identified> {
     }
     let coordinates = vec!["theta1".into(), "theta2".into()];
     let recording = Recording { coordinates, periodic: vec![true; 2], tracks };
-    let form = configure::<f64>("double-pendulum", &[])?;
+    let form = SystemInstance::<f64>::named("double-pendulum", &[])?;
     Ok(identify(&form, &recording, &options(&PENDULUM.map(|(name, _)| name)))?)
 }
 

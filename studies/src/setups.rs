@@ -1,7 +1,7 @@
 //! What several studies set up.
 
 use crate::Outcome;
-use lnn::lagrangian::{SystemInstance, configure, configure_system};
+use lnn::lagrangian::SystemInstance;
 use lnn::pipeline::parse_system;
 use lnn_cli::CliError;
 use std::borrow::Cow;
@@ -11,7 +11,7 @@ use std::path::Path;
 pub fn configured(text: &str, given: &[(&str, f64)]) -> Outcome<SystemInstance<f64>> {
     let system = parse_system(text).map_err(|(line, problem)| format!("{line}: {problem}"))?;
     let given: Vec<(String, String)> = given.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-    Ok(configure_system(Cow::Owned(system), &given)?)
+    Ok(SystemInstance::new(Cow::Owned(system), &given)?)
 }
 
 /// The system of the catalogue of a name, or that of a file whose name ends in `.toml`, with these values of its parameters.
@@ -21,9 +21,9 @@ pub fn configured(text: &str, given: &[(&str, f64)]) -> Outcome<SystemInstance<f
 pub fn named(system: &str, given: &[(String, String)]) -> Result<SystemInstance<f64>, CliError> {
     let path = Path::new(system);
     if path.extension().is_none_or(|end| !end.eq_ignore_ascii_case("toml")) {
-        return configure(system, given).map_err(CliError::usage);
+        return SystemInstance::named(system, given).map_err(CliError::usage);
     }
     let text = std::fs::read_to_string(path).map_err(|error| CliError::file(path, error))?;
     let refused = |(line, problem)| CliError::usage(format_args!("{system}:{line}: {problem}"));
-    configure_system(Cow::Owned(parse_system(&text).map_err(refused)?), given).map_err(CliError::usage)
+    SystemInstance::new(Cow::Owned(parse_system(&text).map_err(refused)?), given).map_err(CliError::usage)
 }

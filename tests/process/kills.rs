@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use lnn::configuration::Config;
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use lnn::storage::Disk;
 use lnn::training::{LATEST, PREVIOUS, saved};
@@ -15,7 +15,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 fn config() -> Config {
-    let mut config = Preset::Quick.config(&configure("harmonic-oscillator", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("harmonic-oscillator", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (1024, 64, 64);
     // The program writes out every parameter.
     config.parameters = [("k".to_string(), 1.0), ("m".to_string(), 1.0)].into();

@@ -3,8 +3,8 @@
 use crate::alone;
 use crate::counting::peak;
 use lnn::configuration::{Config, Lbfgs, Precision, Regularizer};
-use lnn::data::sample_all;
-use lnn::lagrangian::configure;
+use lnn::data::Datasets;
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use lnn::storage::Disk;
 use lnn::training::{
@@ -13,7 +13,7 @@ use lnn::training::{
 use std::sync::Arc;
 
 fn config(system: &str, hidden: &[usize], states: usize) -> Config {
-    let mut config = Preset::Quick.config(&configure(system, &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named(system, &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (states, states / 4, states / 4);
     config.network.hidden = hidden.to_vec();
     config.optimizer.batch = 1024;
@@ -27,7 +27,7 @@ fn measured(config: &Config) -> u64 {
     let directory = tempfile::tempdir().unwrap();
     let system = config.system().unwrap();
     let taken = peak(|| {
-        let (data, scale) = sample_all::<f32>(config, &system).unwrap();
+        let (data, scale) = Datasets::<f32>::sample(config, &system).unwrap();
         let architecture = config.architecture(&system, scale).unwrap();
         let identity = Fingerprint { config: String::new(), data: data.checksums() };
         let keeper =

@@ -2,8 +2,8 @@
 
 use crate::alone;
 use crate::counting::peak;
-use lnn::lagrangian::build;
-use lnn::recording::{Columns, read_recording};
+use lnn::lagrangian::SystemInstance;
+use lnn::recording::{Columns, LoadedRecording};
 use lnn::rollout::{RolloutOptions, rollout_in_pieces};
 use lnn::storage::{AtomicWriter, Disk};
 use std::ffi::OsString;
@@ -22,7 +22,7 @@ fn a_rollout_takes_the_same_memory_however_long_it_is() {
     if !alone("streams::a_rollout_takes_the_same_memory_however_long_it_is") {
         return;
     }
-    let system = build::<f64>("double-pendulum", &[]).unwrap();
+    let system = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("motion.csv");
     let taken = |dt: f64| {
@@ -98,7 +98,7 @@ fn an_archive_is_read_in_the_memory_of_its_numbers() {
     let time = || vector((0..ROWS).map(|k| k as f64 / 100.0), ROWS);
     let wave = vector((0..ROWS).map(|k| (k as f64 / 30.0).sin()), ROWS);
     archive(&path, &[("t.npy", time()), ("q.npy", wave)]);
-    let taken = peak(|| assert_eq!(read_recording(&[&path], &columns).unwrap().recording.samples(), ROWS));
+    let taken = peak(|| assert_eq!(LoadedRecording::read(&[&path], &columns).unwrap().recording.samples(), ROWS));
     let numbers = 2 * 8 * ROWS;
     println!("{numbers} bytes of numbers: {taken} bytes");
     assert!(taken < numbers + numbers / 4 + (1 << 20), "{taken} bytes");
@@ -114,7 +114,7 @@ fn an_archive_is_read_in_the_memory_of_its_numbers() {
         let columns = if columns.time.is_some() { Columns { rate: None, ..columns } } else { columns };
         archive(&path, &[("a.npy", first), ("b.npy", second)]);
         let taken = peak(|| {
-            let refusal = read_recording(&[&path], &columns).unwrap_err().to_string();
+            let refusal = LoadedRecording::read(&[&path], &columns).unwrap_err().to_string();
             assert!(refusal.contains(problem), "{refusal}");
         });
         assert!(taken < 1 << 20, "{problem}: {taken} bytes");
@@ -122,6 +122,6 @@ fn an_archive_is_read_in_the_memory_of_its_numbers() {
     // A table that promises a terabyte.
     let table = folder.path().join("motion.npy");
     std::fs::write(&table, vector([1.0, 2.0].into_iter(), 1 << 37)).unwrap();
-    let taken = peak(|| assert!(read_recording(&[&table], &rate("1")).is_err()));
+    let taken = peak(|| assert!(LoadedRecording::read(&[&table], &rate("1")).is_err()));
     assert!(taken < 1 << 20, "{taken} bytes");
 }

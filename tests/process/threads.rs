@@ -5,7 +5,7 @@ use crate::alone;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::data::{Noise, StateEstimate};
-use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
+use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use lnn::network::{Architecture, Layout, ModelFile, NetworkLagrangian};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::recording::RecordedTrajectory;
@@ -54,7 +54,7 @@ fn threads_are_the_callers_choice() {
     .unwrap();
     let architecture = file.header.architecture.clone();
     let learned = NetworkLagrangian::new(file.header.architecture, file.weights.clone()).unwrap();
-    let written = build::<f64>("double-pendulum", &[]).unwrap();
+    let written = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
     let q: Vec<f64> = (0..400).map(|k| (0.7 * f64::from(k)).sin()).collect();
     let v: Vec<f64> = (0..400).map(|k| (0.3 * f64::from(k)).cos()).collect();
     let mut terms = Terms::default();

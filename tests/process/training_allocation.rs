@@ -4,7 +4,7 @@ use crate::alone;
 use crate::counting::allocations;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, initial_weights};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout};
 use lnn::optimizers::{Method, Moments, Update};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
@@ -34,7 +34,7 @@ fn allocates_nothing(activation: ActivationChoice, input_layer: InputLayer, diss
         form: Form::default(),
     };
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut weights: Vec<f32> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let mut weights: Vec<f32> = architecture.initial_weights(Initialization::Default, &mut rng);
     let mut draw = || (0..2 * 256).map(|_| rng.random_range(-2.0..2.0)).collect();
     let data = Dataset::new(2, draw(), draw(), draw()).unwrap().with_forces(draw()).unwrap();
     let rows: Vec<u32> = (0..256).collect();

@@ -1,8 +1,6 @@
 //! The program `lnn` from outside: runs with a time limit, files to give it, a small model.
 
-use lnn::network::{
-    ActivationChoice, Architecture, FORMAT, Form, Header, InputLayer, Layout, ModelFile, StoredPrecision,
-};
+use lnn::network::{ActivationChoice, Architecture, Form, Header, InputLayer, Layout, ModelFile, StoredPrecision};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -155,7 +153,7 @@ pub fn model() -> ModelFile<f32> {
     };
     let count = Layout::new(&architecture).parameters;
     let header = Header {
-        format: FORMAT,
+        format: Header::FORMAT,
         crate_version: env!("CARGO_PKG_VERSION").to_string(),
         architecture,
         system: "double-pendulum".to_string(),

@@ -6,8 +6,8 @@ use crate::number::{finite, index_of, range, seconds, thread_count, threads, who
 use crate::source::{SystemOrModel, require_at_most};
 use crate::system_arg::{self, learned_system};
 use crate::{CliError, interrupt};
-use lnn::certificate::{Certificate, CertificateError, CertificateOptions, Signature, certify_network, certify_system};
-use lnn::lagrangian::configure_system;
+use lnn::certificate::{Certificate, CertificateError, CertificateOptions, Signature};
+use lnn::lagrangian::SystemInstance;
 use lnn::lagrangian::system::Bounds;
 use lnn::network::file::{Header, MAX_COORDINATES};
 use serde::Serialize;
@@ -85,18 +85,18 @@ pub fn run(args: &Args) -> Result<(), CliError> {
             let options =
                 args.options(header.columns.len() / 2, header.architecture.time_like.or(time).is_some(), &stop);
             let region = args.region(&header.columns, trained(&header))?;
-            let found = certify_network(&network, &region, &options).map_err(refused)?;
+            let found = Certificate::of_network(&network, &region, &options).map_err(refused)?;
             (header.system, header.columns, found)
         }
         None => {
             let system = system_arg::system(args.subject.system.as_deref().unwrap_or_default())?;
-            let configured = configure_system::<f64>(system, &args.subject.param).map_err(CliError::usage)?;
+            let configured = SystemInstance::<f64>::new(system, &args.subject.param).map_err(CliError::usage)?;
             require_at_most(MAX_COORDINATES, configured.coordinates)?;
             let n = configured.coordinates;
             let columns = configured.system.columns(n);
             let options = args.options(n, configured.system.time_like.is_some(), &stop);
             let region = args.region(&columns, configured.system.validation(n))?;
-            let found = certify_system(&configured, &region, &options).map_err(refused)?;
+            let found = Certificate::of_system(&configured, &region, &options).map_err(refused)?;
             (configured.system.name.to_string(), columns, found)
         }
     };

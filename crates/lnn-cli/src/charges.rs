@@ -6,7 +6,7 @@ use crate::thresholds::CHARGES_SEED;
 use lnn::findings::text_table;
 use lnn::names::rounded;
 use lnn::rollout::Trajectory;
-use lnn::symmetry::{charges, unknowns};
+use lnn::symmetry::{Charge, unknowns};
 use serde::Serialize;
 
 /// A charge and its drift.
@@ -43,7 +43,7 @@ impl Charges {
         let (q, v) = probe.states(probe.enough(unknowns(model.coordinates(), largest.len())), CHARGES_SEED)?;
         let (found, _) = probe.symmetries(None, (&q, &v), None)?;
         let basis = &found.basis;
-        let all = charges(model, basis, &found.fields, motion).map_err(CliError::data)?;
+        let all = Charge::of(model, basis, &found.fields, motion).map_err(CliError::data)?;
         let names = std::iter::once(found.invariant.charge().to_string())
             .chain(found.fields.iter().map(|field| field.text(basis)));
         let rows = names.zip(&all).map(|(symmetry, charge)| {

@@ -5,7 +5,7 @@ use crate::probe::{Bound, Probe, bound};
 use crate::source::parameter;
 use crate::symmetries::degrees;
 use crate::{CliError, number};
-use lnn::symmetry::{ComparisonSummary, Degrees, compare, unknowns};
+use lnn::symmetry::{Comparison, ComparisonSummary, Degrees, unknowns};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -58,7 +58,8 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let points = first.points(args.points, first.enough(basis.len()), unknowns)?;
     // States lie on the mass shell of a system, because a model may be untrained off it.
     let (q, v) = first.states_beside(&second, points, args.seed)?;
-    let found = compare(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
+    let found =
+        Comparison::of(first.model.as_ref(), second.model.as_ref(), &basis, (&q, &v)).map_err(CliError::data)?;
     let [first, second] = [&args.first, &args.second].map(Clone::clone);
     let compared = ComparisonSummary { first, second, comparison: found, points, seed: args.seed };
     args.format.print(&compared, ComparisonSummary::findings)

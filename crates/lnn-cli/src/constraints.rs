@@ -9,7 +9,7 @@ use crate::watch::search;
 use crate::{CliError, config, output};
 use lnn::constraints::{
     ConstraintSearch, ConstraintSearchError, EXAMINED_STATES, ExaminedLagrangian, FoundConstraints, MotionSamples,
-    examine, find_constraints,
+    examine,
 };
 use lnn::lagrangian::{EulerLagrange, FormulaConstraints};
 use lnn::recording::SmoothOptions;
@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let recording = args.recording.read()?.0.recording;
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?.watched(&search()?);
     let wanted = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
-    let found = find_constraints(&samples, wanted).map_err(|error| match error {
+    let found = FoundConstraints::of(&samples, wanted).map_err(|error| match error {
         ConstraintSearchError::Cancelled(_) => CliError::nothing_written(),
         error => CliError::data(error),
     })?;

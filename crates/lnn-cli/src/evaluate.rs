@@ -8,7 +8,7 @@ use crate::watch::watch;
 use crate::{CliError, interrupt, output, source};
 use lnn::lagrangian::SystemInstance;
 use lnn::lagrangian::system::{Bounds, TrajectoryTest};
-use lnn::pipeline::{EvaluationOptions, PipelineError, RTOL, evaluate};
+use lnn::pipeline::{Evaluation, EvaluationOptions, PipelineError, RTOL};
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -98,7 +98,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     // If the model's file describes a system, the constraints are already part of that system.
     options.constraints = learned.header.description.is_none().then(|| learned.header.constraints.clone());
     let stop = interrupt::flag()?;
-    let evaluation = match evaluate(&system, &learned.network, options, &watch(&stop)) {
+    let evaluation = match Evaluation::of(&system, &learned.network, options, &watch(&stop)) {
         Err(PipelineError::Interrupted) => {
             return Err(CliError::interrupted("interrupted before anything was compared"));
         }

@@ -7,10 +7,7 @@ use crate::recording_args::RecordingArgs;
 use crate::result_page::{self, PageArgs};
 use crate::watch::search;
 use crate::{CliError, output};
-use lnn::formula::{
-    Families, FormulaError, FormulaOptions, FoundFormula, MODEL_STATES, MOST_BOOTSTRAPS, formula_of_model,
-    formula_of_motion,
-};
+use lnn::formula::{Families, FormulaError, FormulaOptions, FoundFormula, MODEL_STATES, MOST_BOOTSTRAPS};
 use lnn::identification::Between;
 use lnn::pipeline::parse_system;
 use lnn::recording::LoadedRecording;
@@ -185,7 +182,7 @@ fn of_motion(args: &Args) -> Result<FoundFormula, CliError> {
         return Err(CliError::usage(format_args!("--noise: expected {n} numbers, found {}", noise.len())));
     }
     let units = reading.coordinate_units();
-    formula_of_motion(&reading.recording, &FormulaOptions { units, ..args.options()? })
+    FoundFormula::of_motion(&reading.recording, &FormulaOptions { units, ..args.options()? })
         .map_err(|error| in_file(error, &reading))
 }
 
@@ -207,7 +204,7 @@ fn of_model(args: &Args, path: &Path) -> Result<FoundFormula, CliError> {
     let chart = (probe.coordinates(), &probe.periodic[..]);
     let (units, time_unit) = probe.units();
     let options = FormulaOptions { units, time_unit, ..args.options()? };
-    formula_of_model(probe.model.as_ref(), chart, (&q, &v), &options).map_err(refused)
+    FoundFormula::of_model(probe.model.as_ref(), chart, (&q, &v), &options).map_err(refused)
 }
 
 /// Like [`refused`], with the row in the file.

@@ -8,7 +8,7 @@ use crate::source::parameter;
 use crate::watch::search;
 use crate::{CliError, output, system_arg};
 use lnn::identification::{Between, Identified, IdentifyError, IdentifyOptions, identify};
-use lnn::lagrangian::{SystemInstance, configure_system};
+use lnn::lagrangian::SystemInstance;
 use lnn::names::pluralize;
 use lnn::pipeline::{is_robot, parse_system, rewrite_robot};
 use lnn::recording::{Columns, LoadedRecording, Targets};
@@ -101,7 +101,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let out = args.out.as_deref().map(|out| claim(args, out, &inputs)).transpose()?;
     let page = args.page.claim(&inputs)?;
     let instance =
-        configure_system::<f64>(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
+        SystemInstance::<f64>::new(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
     system_arg::note_impacts(&instance);
     let reading = read(args, &instance)?;
     let options = IdentifyOptions::new()

@@ -416,11 +416,11 @@ fn is_list_of_tables(items: &[Value]) -> bool {
 mod tests {
     use super::*;
     use lnn::configuration::{Config, Lbfgs, Regularizer};
-    use lnn::lagrangian::configure;
+    use lnn::lagrangian::SystemInstance;
     use lnn::presets::Preset;
 
     fn base(system: &str) -> Config {
-        Preset::Quick.config(&configure(system, &[]).unwrap()).unwrap()
+        Preset::Quick.config(&SystemInstance::named(system, &[]).unwrap()).unwrap()
     }
 
     fn over(system: &str, text: &str, options: Vec<Entry>) -> (Config, Vec<String>) {

@@ -3,7 +3,7 @@
 use crate::CliError;
 use crate::input::is_standard;
 use crate::system_arg::{self, learned_system};
-use lnn::lagrangian::{EulerLagrange, SystemInstance, configure_system, configure_values, find};
+use lnn::lagrangian::{EulerLagrange, System, SystemInstance};
 use lnn::network::NetworkLagrangian;
 use lnn::network::file::{Header, ModelFile};
 use lnn::pipeline::{self, trained_on};
@@ -74,13 +74,14 @@ impl<S: Scalar> Learned<S> {
     /// # Errors
     /// A data error for a system that is known only from recordings.
     pub fn system(&self, path: &Path) -> Result<SystemInstance<f64>, CliError> {
-        let known = self.header.description.is_some() || find(&self.header.system).is_ok();
+        let known = self.header.description.is_some() || System::named(&self.header.system).is_ok();
         if !known {
             let problem = "is not a built-in system, so that there is no exact motion to compare with; give its file with --system FILE.toml";
             return Err(CliError::file(path, format_args!("{:?}, which it learned, {problem}", self.header.system)));
         }
         let system = learned_system(&self.header).map_err(|e| CliError::file(path, e))?;
-        let configured = configure_values(system, &self.header.parameters).map_err(|e| CliError::file(path, e))?;
+        let configured =
+            SystemInstance::with_values(system, &self.header.parameters).map_err(|e| CliError::file(path, e))?;
         if configured.system.columns(configured.coordinates) != self.header.columns {
             return Err(CliError::file(path, format_args!("columns are not those of {}", self.header.system)));
         }
@@ -92,7 +93,7 @@ impl<S: Scalar> Learned<S> {
     /// # Errors
     /// A usage error for an unknown system, a wrong parameter, or other columns.
     pub fn beside(&self, name: &str, given: &[(String, String)]) -> Result<SystemInstance<f64>, CliError> {
-        let configured = configure_system(system_arg::system(name)?, given).map_err(CliError::usage)?;
+        let configured = SystemInstance::new(system_arg::system(name)?, given).map_err(CliError::usage)?;
         let columns = configured.system.columns(configured.coordinates);
         if columns != self.header.columns {
             let (found, expected) = (columns.join(","), self.header.columns.join(","));

@@ -5,7 +5,7 @@ use crate::learned::{Learned, model_file};
 use crate::source::Source;
 use crate::system_arg::{self, learned_system};
 use crate::{CliError, forces};
-use lnn::lagrangian::{EulerLagrange, SystemInstance, configure_system};
+use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::report::with_unit;
 use lnn::rollout::{Domain, Event};
 use std::path::{Path, PathBuf};
@@ -72,7 +72,7 @@ impl MotionSource {
     /// A usage error for an unknown name, a mistake in a file or a wrong parameter.
     pub fn system(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
         let system = system_arg::system(name)?;
-        let instance = configure_system::<f64>(system.clone(), given).map_err(CliError::usage)?;
+        let instance = SystemInstance::<f64>::new(system.clone(), given).map_err(CliError::usage)?;
         let Source { model, columns, mut forces } = Source::of(&instance)?;
         let events = instance.events().into_iter().map(Event::from).collect();
         forces.extend(instance.inputs().map(str::to_string));

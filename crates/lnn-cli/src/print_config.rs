@@ -2,7 +2,7 @@
 
 use crate::thresholds::COMMENT_WIDTH;
 use lnn::configuration::{Below, Config, Key, join};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::pipeline::FitConfig;
 use lnn::presets::Preset;
 use lnn::shooting::Shooting;
@@ -85,7 +85,8 @@ fn write_table(
 /// The keys of a training as a page of Markdown: a table for every table of the file, with the values of the quick preset for the
 /// double pendulum.
 pub fn training_reference() -> String {
-    let quick = configure::<f64>("double-pendulum", &[]).ok().and_then(|system| Preset::Quick.config(&system));
+    let quick =
+        SystemInstance::<f64>::named("double-pendulum", &[]).ok().and_then(|system| Preset::Quick.config(&system));
     let mut page = String::new();
     let shooting: Vec<Key> = FitConfig::KEYS.iter().filter(|key| key.name == "shooting").copied().collect();
     describe(Config::KEYS, &serde_json::to_value(quick).unwrap_or_default(), "quick preset", &mut page);
@@ -151,7 +152,7 @@ mod tests {
     use crate::parse_config;
     use lnn::configuration::find_key;
     use lnn::configuration::{Known, Lbfgs, Regularizer};
-    use lnn::lagrangian::systems;
+    use lnn::lagrangian::System;
     use lnn::recording::Targets;
     use std::collections::BTreeSet;
 
@@ -161,9 +162,9 @@ mod tests {
 
     #[test]
     fn a_commented_configuration_is_the_configuration() {
-        for system in systems() {
+        for system in System::all() {
             for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
-                let configured = configure(&system.name, &[]).unwrap();
+                let configured = SystemInstance::named(&system.name, &[]).unwrap();
                 let Some(mut config) = preset.config(&configured) else { continue };
                 config.parameters.insert("m 1".to_string(), 2.0);
                 config.optimizer.clip = f64::INFINITY;
@@ -185,7 +186,7 @@ mod tests {
 
     #[test]
     fn every_key_is_commented_and_those_left_out_can_be_taken_in() {
-        let config = Preset::Paper.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+        let config = Preset::Paper.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
         let text = print(&config);
         assert!(text.lines().all(|line| !line.starts_with('#') || line.chars().count() <= COMMENT_WIDTH));
         assert_eq!(text.matches("\n[[phase]]").count(), 3);
@@ -238,7 +239,7 @@ mod tests {
     /// Every key is declared in the order of its table, and none is missing.
     #[test]
     fn the_declared_keys_are_those_that_are_written() {
-        let mut config = Preset::Quick.config(&configure("ads4-geodesic", &[]).unwrap()).unwrap();
+        let mut config = Preset::Quick.config(&SystemInstance::named("ads4-geodesic", &[]).unwrap()).unwrap();
         config.network.known = Some(Known::File("a.toml".to_string()));
         config.penalty = Regularizer::LorentzianSylvester { lambda: 1.0, time: "t".to_string() };
         let table = Table::try_from(&config).unwrap();

@@ -6,7 +6,7 @@ use crate::number::{bounds, index_of, positive};
 use crate::source::{Source, require_at_most};
 use crate::system_arg::{self, learned_system};
 use crate::thresholds::NARROWEST_RANGE;
-use lnn::lagrangian::{EulerLagrange, SystemInstance, configure_system};
+use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::network::file::MAX_COORDINATES;
 use lnn::symmetry::{
     Basis, Chart, Degrees, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states, most_symmetries,
@@ -97,7 +97,7 @@ impl Probe {
     /// # Errors
     /// Those of [`Probe::system`].
     fn system_with_constraints(name: &str, given: &[(String, String)]) -> Result<Self, CliError> {
-        let configure = |system| configure_system::<f64>(system, given).map_err(CliError::usage);
+        let configure = |system| SystemInstance::<f64>::new(system, given).map_err(CliError::usage);
         let mut configured = configure(system_arg::system(name)?)?;
         // The drive of a system is removed, because properties of a Lagrangian do not depend on it.
         if let Some(driven) = configured.system.description().filter(|_| configured.is_timed()) {

@@ -3,7 +3,7 @@
 use crate::spool::read_spooled;
 use crate::{CliError, number, output};
 use lnn::names::pluralize;
-use lnn::recording::{ColumnGuess, Columns, DataError, Guess, LoadedRecording, Problem, guess, read_recording};
+use lnn::recording::{ColumnGuess, Columns, DataError, Guess, LoadedRecording, Problem};
 use std::path::PathBuf;
 
 /// Recorded motion.
@@ -89,7 +89,7 @@ impl RecordingArgs {
         let mut guessed = Guess { columns: self.meaning(), table: Vec::new() };
         let read = read_spooled(&self.data, |files| {
             if self.coords.is_empty() {
-                guessed = guess(files, &guessed.columns)?;
+                guessed = Guess::of(files, &guessed.columns)?;
             }
             if !beside {
                 guessed.columns.input.clear();
@@ -141,7 +141,7 @@ impl RecordingArgs {
     /// Those of [`read`].
     pub fn complete(&self) -> Result<Self, CliError> {
         let columns = self.meaning();
-        let Guess { columns, table } = guess(&self.data, &columns).map_err(|error| refused(&error, &columns))?;
+        let Guess { columns, table } = Guess::of(&self.data, &columns).map_err(|error| refused(&error, &columns))?;
         note(&columns, &table);
         let Columns { coords, velocity, acceleration, force, time, rate, trajectory, periodic, units, .. } = columns;
         let args = self.clone();
@@ -164,7 +164,7 @@ fn note(columns: &Columns, table: &[ColumnGuess]) {
 /// A usage error for columns that contradict each other, a data error for the first file that does not match.
 pub fn read(files: &[PathBuf], columns: &Columns) -> Result<LoadedRecording, CliError> {
     let reading =
-        read_spooled(files, |files| read_recording(files, columns)).map_err(|error| refused(&error, columns))?;
+        read_spooled(files, |files| LoadedRecording::read(files, columns)).map_err(|error| refused(&error, columns))?;
     note_incomplete(&reading);
     Ok(reading)
 }

@@ -151,13 +151,13 @@ fn scale_epochs(config: &mut Config, total: usize) -> Result<(), CliError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lnn::lagrangian::configure;
+    use lnn::lagrangian::SystemInstance;
     use lnn::presets::Preset;
 
     #[test]
     fn the_whole_schedule_is_scaled() {
         let of = |total| {
-            let mut config = Preset::Paper.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+            let mut config = Preset::Paper.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
             scale_epochs(&mut config, total)?;
             Ok::<_, CliError>(config.phases.iter().map(|p| (p.epochs, p.t_max)).collect::<Vec<_>>())
         };

@@ -11,8 +11,7 @@ use lnn::lagrangian::{EulerLagrange, MechanicsError};
 use lnn::names::pluralize;
 use lnn::pipeline::require_memory;
 use lnn::relativity::{
-    Camera, Chart, Observer, RelativityError, ShadowSummary, TOLERANCES, Tracing, TwoSided, picture, time_moves_alone,
-    views,
+    Camera, Chart, Observer, RelativityError, ShadowSummary, TOLERANCES, Tracing, TwoSided, View, time_moves_alone,
 };
 use lnn::report::png;
 use std::path::PathBuf;
@@ -109,7 +108,7 @@ impl Args {
         if let Some(name) = &self.system {
             let configured = match &learned {
                 Some(learned) => learned.beside(name, &self.param)?,
-                None => lnn::lagrangian::configure_system(system_arg::system(name)?, &self.param)
+                None => lnn::lagrangian::SystemInstance::new(system_arg::system(name)?, &self.param)
                     .map_err(CliError::usage)?,
             };
             let source = Source::<f64>::configured(configured.system.clone(), &self.param)?;
@@ -214,12 +213,12 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         progress.advance(done.fetch_add(rays, Ordering::Relaxed) + rays);
     };
     let metrics: Vec<_> = models.iter().map(|(name, model)| (*name, &**model)).collect();
-    let found = views(&metrics, (&camera, &tracing, args.edges), &stop, &|name| progress.say(name), &advance);
+    let found = View::of(&metrics, (&camera, &tracing, args.edges), &stop, &|name| progress.say(name), &advance);
     let views = found.map_err(refused)?;
     drop(progress);
     let interrupted = stop.load(Ordering::Relaxed);
 
-    out.write(&png(&picture(&camera, &views).map_err(refused)?))?;
+    out.write(&png(&camera.picture(&views).map_err(refused)?))?;
     let alone = |model: &dyn EulerLagrange<f64>| time_moves_alone(model, camera.chart, camera.distance);
     let free_factor = args.model.is_some() && models.iter().any(|(_, model)| alone(&**model));
     let summary = ShadowSummary::of((&system, unit.as_deref()), (&camera, &tracing), &views, free_factor);

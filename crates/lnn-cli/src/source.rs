@@ -3,7 +3,7 @@
 use crate::learned::Learned;
 use crate::{CliError, forces, output, system_arg};
 use lnn::lagrangian::system::System;
-use lnn::lagrangian::{EulerLagrange, SystemInstance, configure_system};
+use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::pipeline::usual_force;
 use lnn::scalar::Scalar;
 use std::borrow::Cow;
@@ -36,7 +36,7 @@ impl<S: Scalar> Source<S> {
     /// # Errors
     /// A usage error for a wrong parameter.
     pub fn configured(system: Cow<'static, System>, given: &[(String, String)]) -> Result<Self, CliError> {
-        let configured = configure_system::<S>(system, given).map_err(CliError::usage)?;
+        let configured = SystemInstance::<S>::new(system, given).map_err(CliError::usage)?;
         if let Some(input) = configured.inputs().next() {
             let problem = "depend on the input";
             return Err(CliError::usage(format_args!(

@@ -5,7 +5,7 @@ use crate::probe::{Bound, Probe, bound, tolerance};
 use crate::source::SystemOrModel;
 use crate::thresholds::{LONG_SEARCH, MOST_QUADRATIC_UNKNOWNS};
 use crate::{CliError, number, output};
-use lnn::symmetry::{Degrees, EXACT, MOST_UNKNOWNS, SymmetrySummary, quadratic, quadratic_unknowns, unknowns};
+use lnn::symmetry::{Degrees, MOST_UNKNOWNS, Quadratic, Symmetries, SymmetrySummary, quadratic_unknowns, unknowns};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -59,11 +59,11 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let points = probe.points(args.points, probe.enough(second(MOST_QUADRATIC_UNKNOWNS)), second(MOST_UNKNOWNS))?;
     announce(own, points, args.quadratic);
     let (q, v) = probe.states(points, args.seed)?;
-    let tolerance = args.tolerance.or(probe.exact.then_some(EXACT));
+    let tolerance = args.tolerance.or(probe.exact.then_some(Symmetries::EXACT));
     let model = probe.model.as_ref();
     let (found, families) = probe.symmetries(args.basis, (&q, &v), args.tolerance)?;
     let second = match args.quadratic {
-        true => Some(quadratic(model, &found.basis, &found.fields, (&q, &v), tolerance).map_err(CliError::data)?),
+        true => Some(Quadratic::find(model, &found.basis, &found.fields, (&q, &v), tolerance).map_err(CliError::data)?),
         false => None,
     };
     args.format.print(&found.summary(&probe.name, families, args.seed, second), SymmetrySummary::findings)

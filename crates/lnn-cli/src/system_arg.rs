@@ -4,7 +4,7 @@ use crate::files::ends_in;
 use crate::thresholds::MAX_ROBOT_BYTES;
 use crate::{CliError, config, output};
 use lnn::lagrangian::system::System;
-use lnn::lagrangian::{SystemInstance, find, resolve};
+use lnn::lagrangian::{SystemInstance, resolve};
 use lnn::network::file::Header;
 use lnn::pipeline::{is_robot, parse_robot, parse_system};
 use std::borrow::Cow;
@@ -57,7 +57,7 @@ pub fn from_robot<T>(path: &Path, make: impl FnOnce(&str) -> Result<T, (usize, S
 pub fn learned_system(header: &Header) -> Result<Cow<'static, System>, String> {
     match &header.description {
         Some(description) => description.system().map(Cow::Owned).map_err(|error| error.to_string()),
-        None => find(&header.system).map(Cow::Borrowed).map_err(|error| error.to_string()),
+        None => System::named(&header.system).map(Cow::Borrowed).map_err(|error| error.to_string()),
     }
 }
 

@@ -1,8 +1,8 @@
 //! `lnn systems`: the systems that can be learned.
 
 use crate::{CliError, output, system_arg};
+use lnn::lagrangian::constrained_systems;
 use lnn::lagrangian::system::{Bounds, Coordinate, Parameter, Size, System};
-use lnn::lagrangian::{constrained_systems, systems};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 
@@ -24,7 +24,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         Some(system) => vec![system],
         None => {
             let constrained = constrained_systems().into_iter().map(Cow::Owned);
-            systems().iter().map(Cow::Borrowed).chain(constrained).collect()
+            System::all().iter().map(Cow::Borrowed).chain(constrained).collect()
         }
     };
     if args.json {

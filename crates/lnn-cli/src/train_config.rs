@@ -9,7 +9,7 @@ use crate::{CliError, output, source, system_arg};
 use lnn::configuration::Config;
 use lnn::data::SamplingError;
 use lnn::lagrangian::system::System;
-use lnn::lagrangian::{Description, DescriptionError, SystemError, SystemInstance, configure_values, find, resolve};
+use lnn::lagrangian::{Description, DescriptionError, SystemError, SystemInstance, resolve};
 use lnn::network::Initialization;
 use lnn::pipeline::{StartModel as Start, all_parameters};
 use lnn::presets::Preset;
@@ -73,7 +73,7 @@ impl Args {
         // If the system is unknown, the other keys are checked with a known one.
         let usable = match system {
             Ok(system) => system,
-            Err(_) if layers.has_file() => Cow::Borrowed(find("double-pendulum").map_err(CliError::usage)?),
+            Err(_) if layers.has_file() => Cow::Borrowed(System::named("double-pendulum").map_err(CliError::usage)?),
             Err(error) => return Err(CliError::usage(error)),
         };
         let system = instance(&usable, &parameters, &mut mistakes)?;
@@ -249,9 +249,9 @@ fn instance(
 ) -> Result<SystemInstance<f64>, CliError> {
     let defaults = BTreeMap::new();
     let chosen = if mistakes.is_empty() { parameters } else { &defaults };
-    let configured = configure_values(Cow::Owned(system.clone()), chosen).or_else(|error| {
+    let configured = SystemInstance::with_values(Cow::Owned(system.clone()), chosen).or_else(|error| {
         mistakes.extend(wrong_parameters(system, parameters, &error));
-        configure_values(Cow::Owned(system.clone()), &defaults)
+        SystemInstance::with_values(Cow::Owned(system.clone()), &defaults)
     });
     configured.map_err(CliError::usage)
 }
@@ -260,7 +260,7 @@ fn instance(
 fn wrong_parameters(system: &System, parameters: &BTreeMap<String, f64>, error: &SystemError) -> Vec<Mistake> {
     let alone = parameters.iter().filter_map(|(symbol, value)| {
         let one = BTreeMap::from([(symbol.clone(), *value)]);
-        let problem = configure_values::<f64>(Cow::Owned(system.clone()), &one).err()?;
+        let problem = SystemInstance::<f64>::with_values(Cow::Owned(system.clone()), &one).err()?;
         Some(Mistake::new(format!("parameters.{symbol}"), problem))
     });
     let found: Vec<Mistake> = alone.collect();

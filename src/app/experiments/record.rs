@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn rows_gather_runs_of_one_label_and_count_failures() {
-        let system = crate::lagrangian::configure("harmonic-oscillator", &[]).unwrap();
+        let system = crate::lagrangian::SystemInstance::named("harmonic-oscillator", &[]).unwrap();
         let run = |label: &str| Run {
             name: label.to_string(),
             label: label.to_string(),

@@ -110,7 +110,7 @@ mod tests {
         let choices = combinations(&variations);
         assert_eq!((choices.len(), choices[1][1].1.as_str()), (6, "y"));
         assert_eq!(combinations(&[]), [Vec::new()]);
-        let system = crate::lagrangian::configure("harmonic-oscillator", &[]).unwrap();
+        let system = crate::lagrangian::SystemInstance::named("harmonic-oscillator", &[]).unwrap();
         let config = Preset::Quick.config(&system).unwrap();
         let pairs = |choices: Vec<Choice>| choices.into_iter().map(|choice| (choice, config.clone())).collect();
         let runs = sweep_runs(pairs(choices), 2);

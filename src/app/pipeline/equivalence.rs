@@ -3,7 +3,7 @@
 use crate::lagrangian::EulerLagrange;
 use crate::names::percent;
 use crate::pipeline::thresholds::EQUIVALENCE_STATES;
-use crate::symmetry::{Basis, Chart, SymmetryError, compare};
+use crate::symmetry::{Basis, Chart, Comparison, SymmetryError};
 use serde::Serialize;
 
 /// The best fit `learned = f(exact) + dF/dt + constant`, and the remaining relative differences.
@@ -48,7 +48,7 @@ impl Equivalence {
         basis: &Basis,
         (q, v): (&[f64], &[f64]),
     ) -> Result<Self, SymmetryError> {
-        let found = compare(learned, exact, basis, (q, v))?;
+        let found = Comparison::of(learned, exact, basis, (q, v))?;
         let slope = found.factors.first().copied().filter(|slope| *slope != 0.0 && !found.on_shell);
         Ok(Self {
             factor: slope.map(|slope| 1.0 / (slope * found.group_factors.first().unwrap_or(&1.0))),

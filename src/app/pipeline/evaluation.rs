@@ -3,9 +3,9 @@
 use crate::analysis::{
     Axis, ErrorDistribution, Grid, MassMatrixError, Portrait, StartBox, Statistics, TrajectoryRun, TrajectorySummary,
     TrajectoryTest, ValidTimes, acceleration_errors, conserved_error, determinant_grid, lagrangian_grid,
-    mass_matrix_error, mass_matrix_error_within, nearest_factor, statistics, wrong_signatures,
+    mass_matrix_error_within, nearest_factor, statistics, wrong_signatures,
 };
-use crate::data::sample;
+use crate::data::Dataset;
 use crate::lagrangian::system::TrajectoryTest as Span;
 use crate::lagrangian::{EulerLagrange, FormulaConstraints, SystemInstance};
 use crate::names::{number, pluralize};
@@ -116,69 +116,71 @@ impl EvaluationOptions {
         let pairs = |bounds: &[(f64, f64)]| bounds.iter().map(|&(low, high)| [low, high]).collect::<Vec<_>>();
         let bounds = (pairs(&bounds.positions), pairs(&bounds.velocities));
         let mut random = RngStream::Test.generator(seed);
-        let states = sample(system, "validation bounds", (&bounds.0, &bounds.1), FRESH_STATES, &mut random)?;
+        let states = Dataset::sample(system, "validation bounds", (&bounds.0, &bounds.1), FRESH_STATES, &mut random)?;
         let states = (states.q().to_vec(), states.v().to_vec());
         let span = system.system.trajectory(system.coordinates);
         Ok(Self { states, starts: STARTS, span, rtol: RTOL, trained, constraints: None, seed, threads: 1 })
     }
 }
 
-/// Compares a model with the system it learned. Comparisons made before an interruption are kept: see [`Evaluation::interrupted`].
-///
-/// # Errors
-/// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`] before anything was compared.
-pub fn evaluate(
-    system: &SystemInstance<f64>,
-    network: &NetworkLagrangian<f64>,
-    options: EvaluationOptions,
-    watch: &Watch,
-) -> Result<Evaluation, PipelineError> {
-    let judging = &Judging::new(watch, EVALUATION_PIECES);
-    let (n, span) = (system.coordinates, &options.span);
-    system.require_states()?;
-    let exact = system.build()?;
-    let learned = constrained(system, network, options.constraints.as_ref())?;
-    let (exact, learned) = (judging.watched(exact.as_ref()), judging.watched(learned.as_ref()));
-    let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
-    let motions = memory::motions((options.starts as u64).saturating_mul(2), span.t_end / span.dt, n, 0);
-    memory::require("the evaluation", motions)?;
-    let (q, v) = (options.states.0.as_slice(), options.states.1.as_slice());
-    let accelerations = acceleration_errors(exact, learned, q, v);
-    let wrong_signature = wrong_signatures(exact, learned, q, v);
-    let mass_matrix = match exact.manifold() {
-        None => mass_matrix_error(exact, learned, q),
-        Some(manifold) => mass_matrix_error_within(manifold, (exact, learned), (q, v)),
-    };
-    judging.check()?;
-    judging.advance(1);
-    let test = trajectory_test(system, &options);
-    let mut runs = test.run_constrained(system, exact, learned)?;
-    runs.retain(|run| !run.is_interrupted());
-    judging.advance(1);
-    let (portraits, figures) = pictures(system, (exact, learned), &test, &runs, &mass_matrix, judging)?;
-    judging.advance(1);
-    let subject = subject(system, network, &options, portraits.first());
-    let is_free = exact.manifold().or(learned.manifold()).is_none();
-    let (physics, is_interrupted) = physics(&subject, is_free, judging)?;
-    judging.advance(1);
-    let starts = || format!("{} of {}", runs.len(), pluralize(options.starts, "start", "starts"));
-    let time_unit = system.system.time_unit.to_string();
-    let coordinates = system.system.coordinates(n);
-    Ok(Evaluation {
-        accelerations,
-        wrong_signature,
-        mass_matrix,
-        valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
-        trajectories: runs.iter().map(|run| Motion::of(run, system, &options.trained)).collect(),
-        physics,
-        interrupted: is_interrupted.then(starts),
-        coordinates: coordinates.iter().map(|c| format!("{} [{}/{time_unit}^2]", c.name, c.unit)).collect(),
-        units: units(system),
-        tested: span.t_end,
-        time_unit,
-        conserved: system.system.conserved.map(|conserved| conserved.name),
-        figures,
-    })
+impl Evaluation {
+    /// Compares a model with the system it learned. Comparisons made before an interruption are kept: see [`Evaluation::interrupted`].
+    ///
+    /// # Errors
+    /// A system that cannot be built, motions that do not fit into memory, [`PipelineError::Interrupted`] before anything was compared.
+    pub fn of(
+        system: &SystemInstance<f64>,
+        network: &NetworkLagrangian<f64>,
+        options: EvaluationOptions,
+        watch: &Watch,
+    ) -> Result<Evaluation, PipelineError> {
+        let judging = &Judging::new(watch, EVALUATION_PIECES);
+        let (n, span) = (system.coordinates, &options.span);
+        system.require_states()?;
+        let exact = system.build()?;
+        let learned = constrained(system, network, options.constraints.as_ref())?;
+        let (exact, learned) = (judging.watched(exact.as_ref()), judging.watched(learned.as_ref()));
+        let (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>) = (&exact, &learned);
+        let motions = memory::motions((options.starts as u64).saturating_mul(2), span.t_end / span.dt, n, 0);
+        memory::require("the evaluation", motions)?;
+        let (q, v) = (options.states.0.as_slice(), options.states.1.as_slice());
+        let accelerations = acceleration_errors(exact, learned, q, v);
+        let wrong_signature = wrong_signatures(exact, learned, q, v);
+        let mass_matrix = match exact.manifold() {
+            None => MassMatrixError::of(exact, learned, q),
+            Some(manifold) => mass_matrix_error_within(manifold, (exact, learned), (q, v)),
+        };
+        judging.check()?;
+        judging.advance(1);
+        let test = trajectory_test(system, &options);
+        let mut runs = test.run_constrained(system, exact, learned)?;
+        runs.retain(|run| !run.is_interrupted());
+        judging.advance(1);
+        let (portraits, figures) = pictures(system, (exact, learned), &test, &runs, &mass_matrix, judging)?;
+        judging.advance(1);
+        let subject = subject(system, network, &options, portraits.first());
+        let is_free = exact.manifold().or(learned.manifold()).is_none();
+        let (physics, is_interrupted) = physics(&subject, is_free, judging)?;
+        judging.advance(1);
+        let starts = || format!("{} of {}", runs.len(), pluralize(options.starts, "start", "starts"));
+        let time_unit = system.system.time_unit.to_string();
+        let coordinates = system.system.coordinates(n);
+        Ok(Evaluation {
+            accelerations,
+            wrong_signature,
+            mass_matrix,
+            valid_time: ValidTimes::of(&runs.iter().map(|run| (run.valid, run.chaos())).collect::<Vec<_>>()),
+            trajectories: runs.iter().map(|run| Motion::of(run, system, &options.trained)).collect(),
+            physics,
+            interrupted: is_interrupted.then(starts),
+            coordinates: coordinates.iter().map(|c| format!("{} [{}/{time_unit}^2]", c.name, c.unit)).collect(),
+            units: units(system),
+            tested: span.t_end,
+            time_unit,
+            conserved: system.system.conserved.map(|conserved| conserved.name),
+            figures,
+        })
+    }
 }
 
 /// Runs the trajectory test with these options.
@@ -422,7 +424,6 @@ fn fixed(system: &SystemInstance<f64>, state: &[f64], axes: [Axis; 2], imposed: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::configure;
     use crate::network::Layout;
     use crate::pipeline::Event;
     use crate::presets::Preset;
@@ -432,7 +433,7 @@ mod tests {
 
     /// An evaluation that a flag ends after this many of its pieces.
     fn ended_behind(pieces: usize) -> Result<Evaluation, PipelineError> {
-        let system = configure::<f64>("harmonic-oscillator", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("harmonic-oscillator", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         config.network.hidden = vec![4];
         let architecture = config.architecture(&system, vec![1.0]).unwrap();
@@ -450,7 +451,7 @@ mod tests {
             }
         };
         let watch = Watch { interrupt: flag, ..Watch::new(events) };
-        evaluate(&system, &network, EvaluationOptions { states, starts: 3, span, ..options }, &watch)
+        Evaluation::of(&system, &network, EvaluationOptions { states, starts: 3, span, ..options }, &watch)
     }
 
     #[test]
@@ -486,7 +487,7 @@ mod tests {
     #[test]
     fn grids_say_where_they_are() {
         let captions = |name: &str| -> Vec<(String, String)> {
-            let system = configure::<f64>(name, &[]).unwrap();
+            let system = SystemInstance::<f64>::named(name, &[]).unwrap();
             let exact = system.build().unwrap();
             let figures = grids(&system, exact.as_ref(), exact.as_ref(), &vec![1.0; system.coordinates]).unwrap();
             figures.into_iter().map(|figure| (figure.file, figure.caption)).collect()

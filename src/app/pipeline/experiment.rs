@@ -313,7 +313,7 @@ mod tests {
     fn damaged_runs_are_told_from_those_of_another_configuration() {
         let directory = tempfile::tempdir().unwrap();
         let store = ExperimentDirectory::new(directory.path());
-        let system = crate::lagrangian::configure("harmonic-oscillator", &[]).unwrap();
+        let system = crate::lagrangian::SystemInstance::named("harmonic-oscillator", &[]).unwrap();
         let run = &Run {
             name: "run".into(),
             label: "row".into(),

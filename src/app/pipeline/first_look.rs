@@ -2,9 +2,9 @@
 
 use crate::cancellation::{Cancellation, Cancelled};
 use crate::configuration::Precision;
-use crate::constraints::{ConstraintSearch, ConstraintSearchError, FoundConstraints, MotionSamples, find_constraints};
+use crate::constraints::{ConstraintSearch, ConstraintSearchError, FoundConstraints, MotionSamples};
 use crate::findings::Findings;
-use crate::formula::{FormulaError, FormulaOptions, FoundFormula, Verdict, formula_of_motion};
+use crate::formula::{FormulaError, FormulaOptions, FoundFormula, Verdict};
 use crate::pipeline::thresholds::{FIRST_LOOK_COORDINATES, FIRST_LOOK_LEAST, FIRST_LOOK_SAMPLES, FIRST_LOOK_TIME};
 use crate::pipeline::{FitOptions, PipelineError, PreparedFit};
 use crate::recording::smooth::SmoothOptions;
@@ -181,7 +181,7 @@ fn constraints(recording: &Recording, stop: &Cancellation) -> Result<Option<Foun
         return Ok(None);
     }
     let Ok(samples) = MotionSamples::of(recording, &SmoothOptions::default()) else { return Ok(None) };
-    match find_constraints(&samples.watched(stop), ConstraintSearch::default()) {
+    match FoundConstraints::of(&samples.watched(stop), ConstraintSearch::default()) {
         Err(ConstraintSearchError::Cancelled(_)) => Err(PipelineError::Interrupted),
         found => Ok(found.ok()),
     }
@@ -201,7 +201,7 @@ fn formula(recording: &Recording, stop: &Cancellation) -> Result<(Option<FoundFo
         cancellation,
         ..FormulaOptions::default()
     };
-    match formula_of_motion(recording, &options) {
+    match FoundFormula::of_motion(recording, &options) {
         Err(FormulaError::Cancelled(Cancelled)) if stop.is_cancelled() => Err(PipelineError::Interrupted),
         Err(FormulaError::Cancelled(Cancelled)) => Ok((None, true)),
         found => Ok((found.ok().filter(|found| found.verdict == Verdict::Found && found.doubts.is_empty()), false)),

@@ -4,7 +4,7 @@ use crate::cancellation::Cancellation;
 use crate::configuration::Precision;
 use crate::data::{Datasets, RecordingSplit, sizes};
 use crate::findings::Findings;
-use crate::formula::{FormulaError, FormulaOptions, FoundFormula, formula_of_motion};
+use crate::formula::{FormulaError, FormulaOptions, FoundFormula};
 use crate::lagrangian::EulerLagrange;
 use crate::network::file::{Header, ModelFile, StoredPrecision};
 use crate::network::{Architecture, Form, Layout, NetworkLagrangian};
@@ -367,7 +367,7 @@ fn formula(
         cancellation: if was_interrupted { Cancellation::default() } else { watch.cancellation() },
         ..FormulaOptions::default()
     };
-    match formula_of_motion(&prepared.measured.training.recording, &options) {
+    match FoundFormula::of_motion(&prepared.measured.training.recording, &options) {
         Ok(found) => (Some(found), None),
         Err(FormulaError::Cancelled(_)) => (None, Some("before a formula was found".to_string())),
         Err(error) => {

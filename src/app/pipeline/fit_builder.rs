@@ -8,7 +8,6 @@ use crate::pipeline::prepared_fit::PreparedFit;
 use crate::pipeline::train::RunOptions;
 use crate::pipeline::{InMemory, LockedDirectory, Output, PipelineError, Watch};
 use crate::presets::restructure;
-use crate::recording::read::read_recording;
 use crate::recording::{Columns, LoadedRecording, Recording};
 use std::path::PathBuf;
 
@@ -168,7 +167,7 @@ impl Fit {
         let Self { source, columns, options, change, friction, structure, precision, threads, out, overwrite, watch } =
             self;
         let (loaded, files) = match source {
-            Source::Files(files) => (read_recording(&files, &columns)?, files),
+            Source::Files(files) => (LoadedRecording::read(&files, &columns)?, files),
             Source::Memory(loaded) => (*loaded, Vec::new()),
         };
         // The columns of files are named by their headers.

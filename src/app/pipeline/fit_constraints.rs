@@ -1,6 +1,6 @@
 //! Constraints of a fit: found in the training motion, or given.
 
-use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, OBEDIENCE, find_constraints};
+use crate::constraints::{ConstraintKind, ConstraintSearch, FoundConstraints, MotionSamples, OBEDIENCE};
 use crate::data::{Dataset, RecordingSplit};
 use crate::lagrangian::FormulaConstraints;
 use crate::names::{pluralize, rounded};
@@ -33,7 +33,7 @@ impl FitHeld {
             FitConstraints::Find => {
                 let samples = MotionSamples::of(recording, &options.preparation().smoothing)?;
                 let found =
-                    find_constraints(&samples, ConstraintSearch::default()).map_err(PipelineError::constraints)?;
+                    FoundConstraints::of(&samples, ConstraintSearch::default()).map_err(PipelineError::constraints)?;
                 let on = pluralize(found.trajectories, "trajectory", "trajectories");
                 let formulas = found.formulas();
                 remarks.push(match formulas.len() {

@@ -1,7 +1,7 @@
 //! Errors of the forces that a learned model computes for held-out motion.
 
 use crate::data::{Dataset, force_spreads};
-use crate::lagrangian::{MechanicsError, inverse_dynamics};
+use crate::lagrangian::{InverseDynamics, MechanicsError};
 use crate::names::{number, percentage};
 use crate::network::NetworkLagrangian;
 use crate::pipeline::thresholds::{FAILED_FORCE, WELL_LEARNED_FORCE};
@@ -46,7 +46,7 @@ pub(crate) fn force_errors(
     names: &[String],
 ) -> Result<Vec<ForceError>, MechanicsError> {
     let n = names.len();
-    let found = inverse_dynamics(network, held_out.q(), held_out.v(), held_out.a())?.external;
+    let found = InverseDynamics::of(network, held_out.q(), held_out.v(), held_out.a())?.external;
     let count = held_out.len() as f64;
     let one = |(i, (name, spread)): (usize, (&String, f64))| {
         let pairs = found.iter().zip(held_out.force()).skip(i).step_by(n);

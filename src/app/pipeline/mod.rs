@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | [`train`] | a [`Config`](crate::configuration::Config) | a model of a known system and its [`Evaluation`] |
 //! | [`Fit`] | recorded motion | a model, judged by motion that was held out ([`HoldOut`]) |
-//! | [`evaluate`] | a model and the system it learned | an [`Evaluation`] |
+//! | [`Evaluation::of`] | a model and the system it learned | an [`Evaluation`] |
 //!
 //! Files go into an [`Output`], such as a [`Directory`] or [`InMemory`]; progress is reported as an [`Event`] to the [`Watch`], whose flag
 //! ends the work. Nothing is printed, a [`Directory`] is not locked, and existing files of the same names are replaced; [`Fit::out`] and
@@ -90,7 +90,7 @@ mod train;
 mod watch;
 
 pub use error::PipelineError;
-pub use evaluation::{Evaluation, EvaluationOptions, evaluate};
+pub use evaluation::{Evaluation, EvaluationOptions};
 pub use first_look::{FirstLook, NextStep};
 pub use fit::FitReport;
 pub use fit_builder::Fit;
@@ -101,7 +101,7 @@ pub use judging::Unjudged;
 pub use model::model_file;
 pub use output::{Directory, InMemory, Output};
 pub use robot::{parse_robot, rewrite_robot};
-pub use sweep::{Sweep, Swept, sweep};
+pub use sweep::{Sweep, Swept};
 pub use text::parse_system;
 pub use train::{RunOptions, TrainFigures, TrainReport, train};
 pub use watch::{Event, Watch};

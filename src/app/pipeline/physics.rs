@@ -2,10 +2,10 @@
 //! learned. Work is limited by counts instead of time, so that every run gives the same results.
 
 use crate::analysis::{
-    MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, mass_matrix_error, matrices_at_rest,
+    MassMatrixError, MetricComponent, Spread, curvature_grid, curvature_scalars, is_metric, matrices_at_rest,
     metric_components,
 };
-use crate::certificate::{CertificateOptions, Signature, certify_network};
+use crate::certificate::{Certificate, CertificateOptions, Signature};
 use crate::geometry::MOST_COORDINATES;
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{EulerLagrange, SystemInstance};
@@ -229,7 +229,7 @@ impl Physics {
             let masses = matrices_at_rest(network, looked_at);
             masses.iter().step_by(n * n).sum::<f64>() * n as f64 / looked_at.len() as f64
         };
-        let at_rest = exact.map(|exact| mass_matrix_error(exact, network, &q));
+        let at_rest = exact.map(|exact| MassMatrixError::of(exact, network, &q));
         let (factor, unit) = match &at_rest {
             // The curvature takes the factor of the whole Lagrangian, which a black box on a mass shell has only at rest.
             Some(at_rest) => (found.filter(|_| metric).unwrap_or(at_rest.factor), String::new()),
@@ -375,7 +375,7 @@ impl Physics {
         };
         let pairs = |ranges: &[[f64; 2]]| ranges.iter().map(|&[low, high]| (low, high)).collect();
         let bounds = Bounds { positions: pairs(&region.position), velocities: pairs(&region.velocity) };
-        match certify_network(network, &bounds, &options) {
+        match Certificate::of_network(network, &bounds, &options) {
             Ok(proven) if proven.certified == 0.0 && proven.refuted == 0.0 => self.left_out.push(format!(
                 "certificate of the signature: {} boxes prove nothing of a network of {} weights; `lnn certify` takes more",
                 proven.boxes,

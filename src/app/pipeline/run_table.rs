@@ -103,7 +103,7 @@ mod tests {
     fn every_run_has_a_line_with_the_choices_in_which_it_differs() {
         let directory = tempfile::tempdir().unwrap();
         let store = ExperimentDirectory::new(directory.path());
-        let system = crate::lagrangian::configure("harmonic-oscillator", &[]).unwrap();
+        let system = crate::lagrangian::SystemInstance::named("harmonic-oscillator", &[]).unwrap();
         let run = |(name, initialization, seed): (&str, Initialization, u64)| {
             let mut config = Preset::Quick.config(&system).unwrap();
             (config.network.initialization, config.seed) = (initialization, seed);

@@ -38,24 +38,26 @@ pub struct Swept {
     pub findings: Findings,
 }
 
-/// Trains every configuration with several seeds, starting with its own, as many at a time as there are threads, each into its own
-/// directory below `path`; finished runs are not repeated. A table and a report of all runs are written there.
-///
-/// # Errors
-/// [`PipelineError::Taken`] for a finished run of another configuration unless `overwrite` is set; files that cannot be written, an
-/// interruption. Finished runs are kept.
-pub fn sweep(
-    configurations: Vec<(Choice, Config)>,
-    (seeds, threads): (usize, usize),
-    (path, overwrite): (&Path, bool),
-    watch: &Watch,
-) -> Result<Swept, PipelineError> {
-    let (runs, store) = (sweep_runs(configurations, seeds), ExperimentDirectory::new(path));
-    for run in runs.iter().filter(|_| !overwrite) {
-        if matches!(kept_record(&store, run)?, KeptRecord::OtherConfiguration) {
-            return Err(PipelineError::Taken { path: path.to_path_buf(), name: run.name.clone() });
+impl Sweep {
+    /// Trains every configuration with several seeds, starting with its own, as many at a time as there are threads, each into its own
+    /// directory below `path`; finished runs are not repeated. A table and a report of all runs are written there.
+    ///
+    /// # Errors
+    /// [`PipelineError::Taken`] for a finished run of another configuration unless `overwrite` is set; files that cannot be written, an
+    /// interruption. Finished runs are kept.
+    pub fn run(
+        configurations: Vec<(Choice, Config)>,
+        (seeds, threads): (usize, usize),
+        (path, overwrite): (&Path, bool),
+        watch: &Watch,
+    ) -> Result<Swept, PipelineError> {
+        let (runs, store) = (sweep_runs(configurations, seeds), ExperimentDirectory::new(path));
+        for run in runs.iter().filter(|_| !overwrite) {
+            if matches!(kept_record(&store, run)?, KeptRecord::OtherConfiguration) {
+                return Err(PipelineError::Taken { path: path.to_path_buf(), name: run.name.clone() });
+            }
         }
+        let done = run_experiment(&Sweep, runs, threads, &store, watch)?;
+        Ok(Swept { rows: done.table.objects(), finished: done.finished, findings: done.findings })
     }
-    let done = run_experiment(&Sweep, runs, threads, &store, watch)?;
-    Ok(Swept { rows: done.table.objects(), finished: done.finished, findings: done.findings })
 }

@@ -2,7 +2,7 @@
 
 use crate::analysis::{stretches, training_instability};
 use crate::configuration::{Config, Penalty, Phase, Precision, Regularizer};
-use crate::data::{Dataset, Datasets, sample_all, sample_all_until};
+use crate::data::{Dataset, Datasets, sample_all_until};
 use crate::experiments::{Learned, Outcome, Record};
 use crate::findings::Findings;
 use crate::lagrangian::system::TrajectoryTest;
@@ -11,7 +11,7 @@ use crate::names::{number, percent, pluralize};
 use crate::network::file::{Header, ModelFile};
 use crate::network::{Architecture, Layout, NetworkLagrangian};
 use crate::pipeline::checkpoints::Checkpoints;
-use crate::pipeline::evaluation::{Evaluation, EvaluationOptions, evaluate};
+use crate::pipeline::evaluation::{Evaluation, EvaluationOptions};
 use crate::pipeline::model::{all_parameters, trained_on};
 use crate::pipeline::report_files::{
     ended, history, parameter_table, training_pictures, write_page, write_report_and_figures,
@@ -246,7 +246,7 @@ fn train_in<S: Scalar>(
         seed: config.seed,
         threads: options.threads,
     };
-    let evaluation = match evaluate(system, &network, judging, watch) {
+    let evaluation = match Evaluation::of(system, &network, judging, watch) {
         Ok(evaluation) if evaluation.interrupted.is_none() => evaluation,
         Ok(_) | Err(PipelineError::Interrupted) => {
             let (stop, history) = (trained.stop, trained.history);
@@ -391,7 +391,7 @@ fn forbidden_share(config: &Config, system: &SystemInstance<f64>) -> Option<f64>
     let Penalty::Sylvester { time: Some(time), .. } = config.penalty().ok()? else { return None };
     let mut few = config.clone();
     (few.data.training, few.data.validation, few.data.test) = (PENALTY_STATES, 1, 1);
-    let (data, _) = sample_all::<f64>(&few, system).ok()?;
+    let (data, _) = Datasets::<f64>::sample(&few, system).ok()?;
     let (set, n, mut terms) = (&data.training[0], system.coordinates, Terms::default());
     system.build().ok()?.terms(set.q(), set.v(), Request::MASS_MATRIX, &mut terms).ok()?;
     let forbidden = terms.mass_matrix.chunks_exact(n * n).filter(|g| g[time * n + time] > 0.0).count();
@@ -401,14 +401,13 @@ fn forbidden_share(config: &Config, system: &SystemInstance<f64>) -> Option<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::configure;
     use crate::network::Structure;
     use crate::presets::Preset;
 
     #[test]
     fn a_penalty_is_known_to_forbid_the_inside_of_a_horizon() {
         let share = |name: &str, radius: [f64; 2]| {
-            let system = configure::<f64>(name, &[]).unwrap();
+            let system = SystemInstance::<f64>::named(name, &[]).unwrap();
             let mut config = Preset::Quick.config(&system).unwrap();
             config.take_structure(Structure::BlackBox);
             config.penalty = Regularizer::LorentzianSylvester { lambda: 1.0, time: "t".to_string() };
@@ -422,7 +421,7 @@ mod tests {
         assert_eq!(share("schwarzschild-cartesian", [1.0, 1.9]), Some(1.0));
         assert!(share("schwarzschild-cartesian", [1.0, 4.0]).is_some_and(|share| (0.3..0.7).contains(&share)));
         assert_eq!(share("ads4-geodesic", [0.0; 2]), Some(0.0));
-        let system = configure::<f64>("kepler", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("kepler", &[]).unwrap();
         assert_eq!(forbidden_share(&Preset::Quick.config(&system).unwrap(), &system), None);
     }
 }

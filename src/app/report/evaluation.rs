@@ -285,7 +285,6 @@ fn component<S: Scalar>(trajectory: &Trajectory<S>, k: usize) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::analysis::{StartBox, TrajectoryTest};
-    use crate::lagrangian::configure;
     use crate::models::{PENDULUM, SINGULAR};
     use crate::report::save_pictures;
 
@@ -319,7 +318,7 @@ mod tests {
         let mut runs = test.run(&PENDULUM, &PENDULUM);
         runs.truncate(1);
         runs.extend(TrajectoryTest { starts: 1, seed: 5, ..test.clone() }.run(&PENDULUM, &SINGULAR));
-        let system = configure::<f64>("n-pendulum", &[("n".to_string(), "1".to_string())]).unwrap();
+        let system = SystemInstance::<f64>::named("n-pendulum", &[("n".to_string(), "1".to_string())]).unwrap();
         let portraits = test.portraits(&PENDULUM, &PENDULUM, &runs);
         let figures = evaluation_figures(&runs, &portraits, &system);
         let expected = [
@@ -339,7 +338,7 @@ mod tests {
 
     #[test]
     fn errors_of_unlike_units_have_pictures_of_their_own() {
-        let system = configure::<f64>("spring-pendulum", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("spring-pendulum", &[]).unwrap();
         let exact = system.build().unwrap();
         let groups = units(&system);
         assert_eq!(
@@ -357,7 +356,7 @@ mod tests {
 
     #[test]
     fn rates_of_clocks_are_shown_where_there_is_a_time() {
-        let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("ads2-geodesic", &[]).unwrap();
         let exact = system.build().unwrap();
         let start = system.system.trajectory(2).start;
         let bounds = StartBox { q: start.positions, v: start.velocities };

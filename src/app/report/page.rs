@@ -1,7 +1,7 @@
 //! A model as an interactive page: an HTML file with the recorded operations, the weights, and JavaScript that evaluates them.
 
 use super::html::{base64, escape};
-use crate::analysis::{mass_matrix_error, mass_matrix_error_within};
+use crate::analysis::{MassMatrixError, mass_matrix_error_within};
 use crate::lagrangian::system::Bounds;
 use crate::lagrangian::{
     Constraints, EulerLagrange, ExpressionConstraints, Lagrangian, LagrangianVisitor, SystemError, SystemInstance,
@@ -185,7 +185,7 @@ fn factors(
     let (q, v): (Vec<Vec<f64>>, Vec<Vec<f64>>) = states.unzip();
     let (q, v) = (q.concat(), v.concat());
     let found = match motion.manifold() {
-        None => mass_matrix_error(exact.as_ref(), network, &q),
+        None => MassMatrixError::of(exact.as_ref(), network, &q),
         Some(manifold) => mass_matrix_error_within(manifold, (exact.as_ref(), network), (&q, &v)),
     };
     Ok(Some(found.factors).filter(|factors| factors.iter().all(|factor| factor.is_finite())))

@@ -12,7 +12,7 @@ pub(crate) use dataset::Weighting;
 pub use dataset::{Dataset, DatasetError, Datasets};
 pub(crate) use force_sizes::{force_spreads, sizes};
 pub use recording_split::RecordingSplitError;
-pub use sampling::{SamplingError, sample, sample_all};
+pub use sampling::SamplingError;
 pub(crate) use sampling::{boxes, sample_all_until};
 
 // Used by the other packages of this repository.

@@ -3,9 +3,9 @@
 use crate::configuration::{Config, ConfigError, Penalty, Precision};
 use crate::data::sampling::SamplingError;
 use crate::lagrangian::system::System;
-use crate::lagrangian::{SystemInstance, configure_values, resolve};
+use crate::lagrangian::{SystemInstance, resolve};
 use crate::network::Architecture;
-use crate::network::file::{FORMAT, Header, StoredPrecision};
+use crate::network::file::{Header, StoredPrecision};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ impl Config {
     /// # Errors
     /// Unknown system or parameter, or a value out of range.
     pub fn system(&self) -> Result<SystemInstance<f64>, SamplingError> {
-        Ok(configure_values(self.system_entry()?, &self.parameters)?)
+        Ok(SystemInstance::with_values(self.system_entry()?, &self.parameters)?)
     }
 
     /// The system: the catalogue entry, or the one that the configuration describes.
@@ -95,7 +95,7 @@ impl Config {
         validation_loss: f64,
     ) -> Header {
         Header {
-            format: FORMAT,
+            format: Header::FORMAT,
             crate_version: env!("CARGO_PKG_VERSION").to_string(),
             architecture,
             system: self.system.clone(),

@@ -14,25 +14,27 @@ use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
 
-/// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
-///
-/// States of a system with a mass shell are put on it: the velocity of the time-like coordinate follows from the other numbers, and its
-/// bounds are ignored. States of a system under constraints are projected onto them, even out of the box. States outside the system's
-/// domain, or with an acceleration that is not finite, are drawn again.
-///
-/// # Errors
-/// [`SamplingError::Domain`] if more than nine in ten draws are refused.
-pub fn sample(
-    system: &SystemInstance<f64>,
-    field: &str,
-    bounds: (&[[f64; 2]], &[[f64; 2]]),
-    states: usize,
-    rng: &mut impl Rng,
-) -> Result<Dataset<f64>, SamplingError> {
-    fill(Drawn::new(system)?, field, bounds, &[], states, (rng, &AtomicBool::new(false)))
+impl Dataset<f64> {
+    /// Draws `states` states uniformly from a box, with their exact accelerations, all in double precision.
+    ///
+    /// States of a system with a mass shell are put on it: the velocity of the time-like coordinate follows from the other numbers, and its
+    /// bounds are ignored. States of a system under constraints are projected onto them, even out of the box. States outside the system's
+    /// domain, or with an acceleration that is not finite, are drawn again.
+    ///
+    /// # Errors
+    /// [`SamplingError::Domain`] if more than nine in ten draws are refused.
+    pub fn sample(
+        system: &SystemInstance<f64>,
+        field: &str,
+        bounds: (&[[f64; 2]], &[[f64; 2]]),
+        states: usize,
+        rng: &mut impl Rng,
+    ) -> Result<Dataset<f64>, SamplingError> {
+        fill(Drawn::new(system)?, field, bounds, &[], states, (rng, &AtomicBool::new(false)))
+    }
 }
 
-/// Draws further states, up to `states`, as [`sample`] does.
+/// Draws further states, up to `states`, as [`Dataset::sample`] does.
 fn fill(
     mut drawn: Drawn<'_>,
     field: &str,
@@ -79,18 +81,17 @@ fn rescale_geodesics(mut set: Dataset<f64>, fraction: f64, rng: &mut impl Rng) -
     set.with_weights(weights)
 }
 
-/// All datasets of a run in its precision, with the physical scale of the first phase's training states.
-///
-/// # Errors
-/// [`SamplingError`].
-pub fn sample_all<S: Scalar>(
-    config: &Config,
-    system: &SystemInstance<f64>,
-) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
-    sample_all_until(config, system, &AtomicBool::new(false))
+impl<S: Scalar> Datasets<S> {
+    /// All datasets of a run in its precision, with the physical scale of the first phase's training states.
+    ///
+    /// # Errors
+    /// [`SamplingError`].
+    pub fn sample(config: &Config, system: &SystemInstance<f64>) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
+        sample_all_until(config, system, &AtomicBool::new(false))
+    }
 }
 
-/// Like [`sample_all`], but stops when the interrupt flag is raised.
+/// Like [`Datasets::sample`], but stops when the interrupt flag is raised.
 ///
 /// # Errors
 /// [`SamplingError`].
@@ -355,8 +356,7 @@ fn turn_back(q: &mut [f64], coordinates: &[Coordinate], bounds: &[[f64; 2]], rng
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::sample_all;
-    use crate::lagrangian::{Request, Terms, configure};
+    use crate::lagrangian::{Request, Terms};
     use crate::presets::Preset;
     use std::borrow::Cow;
     use std::f64::consts::PI;
@@ -364,12 +364,12 @@ mod tests {
     #[test]
     fn every_state_of_a_relativistic_system_is_on_the_mass_shell() {
         let mut seen = 0;
-        for system in crate::lagrangian::systems().iter().filter(|s| s.constraint.is_some()) {
-            let configured = configure::<f64>(&system.name, &[]).unwrap();
+        for system in crate::lagrangian::System::all().iter().filter(|s| s.constraint.is_some()) {
+            let configured = SystemInstance::<f64>::named(&system.name, &[]).unwrap();
             let mut config = Preset::Quick.config(&configured).unwrap();
             (config.data.training, config.data.validation, config.data.test) = (500, 200, 100);
             config.data.rescaled_fraction = 0.0;
-            let (data, scale) = sample_all::<f64>(&config, &configured).unwrap();
+            let (data, scale) = Datasets::<f64>::sample(&config, &configured).unwrap();
             let i = configured.constrained_coordinate().unwrap();
             for set in data.training.iter().chain([&data.validation, &data.test]) {
                 let mut terms = Terms::default();
@@ -390,7 +390,7 @@ mod tests {
             assert!(scale[i] >= data.training[0].ranges()[1][i][1] && scale.iter().all(|s| s.is_finite()));
             // Whatever the bounds of the constrained velocity, nothing changes.
             config.phases[0].velocity[i] = [-7.0, -7.0];
-            assert_eq!(sample_all::<f64>(&config, &configured).unwrap().0.training, data.training);
+            assert_eq!(Datasets::<f64>::sample(&config, &configured).unwrap().0.training, data.training);
             seen += 1;
         }
         assert_eq!(seen, 8);
@@ -398,14 +398,14 @@ mod tests {
 
     #[test]
     fn states_under_constraints_lie_on_them() {
-        let system = configure::<f64>("cartesian-chain-2", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("cartesian-chain-2", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (200, 50, 50);
         // A chain that falls by its own height is faster than the bounds of its states, where a motion would end.
         config.phases[0].velocity.fill([-12.0, 12.0]);
         for fraction in [0.0, 0.5] {
             config.data.trajectory_fraction = fraction;
-            let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+            let (data, _) = Datasets::<f64>::sample(&config, &system).unwrap();
             for set in data.training.iter().chain([&data.validation, &data.test]) {
                 assert_eq!(set.constraints(), 2);
                 for (k, ((q, v), a)) in set.q().chunks(4).zip(set.v().chunks(4)).zip(set.a().chunks(4)).enumerate() {
@@ -422,14 +422,14 @@ mod tests {
         let mut description = system.system.description().unwrap().clone();
         description.name = "unreachable".to_string();
         description.constraints.insert("far".to_string(), "x1 + 5*l".to_string());
-        let far = crate::lagrangian::configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]);
-        assert!(sample_all::<f64>(&config, &far.unwrap()).is_err());
+        let far = crate::lagrangian::SystemInstance::<f64>::new(Cow::Owned(description.system().unwrap()), &[]);
+        assert!(Datasets::<f64>::sample(&config, &far.unwrap()).is_err());
     }
 
     #[test]
     fn a_raised_flag_ends_it() {
         for name in ["harmonic-oscillator", "spring-pendulum", "schwarzschild-cartesian"] {
-            let system = configure::<f64>(name, &[]).unwrap();
+            let system = SystemInstance::<f64>::named(name, &[]).unwrap();
             let config = Preset::Quick.config(&system).unwrap();
             let ended = sample_all_until::<f64>(&config, &system, &AtomicBool::new(true));
             assert!(matches!(ended, Err(SamplingError::Interrupted)), "{name}");
@@ -444,11 +444,11 @@ mod tests {
     }
 
     fn off_the_shell(name: &str) {
-        let system = configure::<f64>(name, &[]).unwrap();
+        let system = SystemInstance::<f64>::named(name, &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
         (config.data.rescaled_fraction, config.data.acceleration_weighting) = (0.25, 0.0);
-        let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+        let (data, _) = Datasets::<f64>::sample(&config, &system).unwrap();
         let (set, mut terms) = (&data.training[0], Terms::default());
         let exact = system.build().unwrap();
         exact.terms(set.q(), set.v(), Request::ENERGY | Request::ACCELERATION, &mut terms).unwrap();
@@ -470,7 +470,7 @@ mod tests {
         assert!((400..600).contains(&off) && (175..325).contains(&reversed) && (175..325).contains(&slow));
         assert!((0..10).all(|k| data.validation.weight(k) == 1.0));
         config.data.rescaled_fraction = 1.5;
-        assert!(matches!(sample_all::<f64>(&config, &system), Err(SamplingError::Config(_))));
+        assert!(matches!(Datasets::<f64>::sample(&config, &system), Err(SamplingError::Config(_))));
     }
 
     #[test]
@@ -492,19 +492,19 @@ mod tests {
             let squared = slowed.a()[2 * k] / weighed.a()[2 * k];
             assert!((slowed.weight(k) * squared / weighed.weight(k) - 1.0).abs() < 1e-12 && squared < 1.0);
         }
-        let system = configure::<f64>("spring-pendulum", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("spring-pendulum", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (50, 10, 10);
-        let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+        let (data, _) = Datasets::<f64>::sample(&config, &system).unwrap();
         assert!((0..50).all(|k| (1e-6..1.0).contains(&data.training[0].weight(k))));
         config.data.acceleration_weighting = -1.0;
-        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        let refused = Datasets::<f64>::sample(&config, &system).unwrap_err().to_string();
         assert!(refused.starts_with("data.acceleration_weighting: ") && refused.ends_with("found -1"), "{refused}");
     }
 
     #[test]
     fn half_of_a_logarithmic_coordinate_is_uniform_in_its_logarithm() {
-        let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("ads2-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (8000, 10, 10);
         config.data.trajectory_fraction = 0.0;
@@ -512,7 +512,7 @@ mod tests {
         let below_four = |log_uniform: &[bool]| {
             let mut config = config.clone();
             config.phases[0].log_uniform = log_uniform.to_vec();
-            let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+            let (data, _) = Datasets::<f64>::sample(&config, &system).unwrap();
             let z = data.training[0].q().chunks(2).map(|q| q[1]);
             assert!(z.clone().all(|z| (0.25..=64.0).contains(&z)));
             z.filter(|z| *z < 4.0).count()
@@ -521,20 +521,20 @@ mod tests {
         let (plain, mixed) = (below_four(&[]), below_four(&[false, true]));
         assert!(plain.abs_diff(471) < 110 && mixed.abs_diff(2235) < 210, "{plain} {mixed}");
         config.phases[0].log_uniform = vec![true, false];
-        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        let refused = Datasets::<f64>::sample(&config, &system).unwrap_err().to_string();
         assert!(refused.starts_with("phase[0].position[0]: expected a lowest coordinate above 0"), "{refused}");
         config.phases[0].log_uniform = vec![true];
-        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        let refused = Datasets::<f64>::sample(&config, &system).unwrap_err().to_string();
         assert!(refused.starts_with("phase[0].log_uniform: expected nothing or true or false"), "{refused}");
     }
 
     #[test]
     fn scales_of_the_papers_geodesics() {
-        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("ads4-geodesic", &[]).unwrap();
         let mut config = Preset::Paper.config(&system).unwrap();
         assert_eq!((config.data.training, config.data.validation), (120_000, 24_000));
         (config.data.training, config.data.validation, config.data.test) = (120_000, 10, 10);
-        let (_, scale) = sample_all::<f32>(&config, &system).unwrap();
+        let (_, scale) = Datasets::<f32>::sample(&config, &system).unwrap();
         // s_t = 6.18, s_x = s_y = 5.00, s_z = 6.00; t_dot is at most sqrt(1 + 1 + 0.6^2 + 6^2) = 6.20.
         assert!((6.15..6.2).contains(&scale[0]), "{scale:?}");
         assert!(scale[1..].iter().zip([5.0, 5.0, 6.0]).all(|(s, paper)| (s - paper).abs() < 0.005), "{scale:?}");
@@ -542,7 +542,7 @@ mod tests {
 
     #[test]
     fn bounds_longer_than_the_largest_number_are_refused_and_can_be_drawn_from() {
-        let system = configure::<f64>("double-pendulum", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap();
         let quick = Preset::Quick.config(&system).unwrap();
         let wide = [-1e308, 1e308];
         type Bounds<'a> = fn(&mut Config) -> &mut Vec<[f64; 2]>;
@@ -555,13 +555,13 @@ mod tests {
         for (field, bounds) in all {
             let mut config = quick.clone();
             bounds(&mut config)[1] = wide;
-            let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+            let refused = Datasets::<f64>::sample(&config, &system).unwrap_err().to_string();
             let expected = "[low, high] no further apart than the largest number, found [-1e308, 1e308]";
             assert_eq!(refused, format!("{field}[1]: expected {expected}"));
             // Recorded states need no bounds, drawn ones do.
             bounds(&mut config).clear();
             assert!(config.validate(2).is_ok());
-            let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+            let refused = Datasets::<f64>::sample(&config, &system).unwrap_err().to_string();
             assert_eq!(refused, format!("{field}: expected one [low, high] per coordinate, found 0 for 2"));
         }
         let mut rng = RngStream::Test.generator(0);
@@ -572,25 +572,25 @@ mod tests {
 
     #[test]
     fn a_time_like_coordinate_is_one_of_the_system() {
-        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("ads4-geodesic", &[]).unwrap();
         for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
             let config = preset.config(&system).unwrap();
             assert_eq!(config.architecture(&system, vec![1.0; 4]).unwrap().time_like, Some(0));
         }
         let mut config = Preset::Quick.config(&system).unwrap();
         config.network.time_like = Some("w".to_string());
-        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        let refused = Datasets::<f64>::sample(&config, &system).unwrap_err().to_string();
         assert_eq!(refused, "network.time_like: expected the name of a coordinate, found `w`; there are t, x, y, z");
-        let pendulum = configure::<f64>("double-pendulum", &[]).unwrap();
+        let pendulum = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap();
         assert_eq!(Preset::Quick.config(&pendulum).unwrap().network.time_like, None);
     }
 
     #[test]
     fn velocities_beyond_light_are_drawn_again_or_refused() {
-        let system = configure::<f64>("charged-particle", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("charged-particle", &[]).unwrap();
         let at = |low: f64, high: f64| {
             let mut rng = RngStream::Test.generator(0);
-            sample(&system, "box", (&[[0.0, 1.0]; 3], &[[low, high]; 3]), 100, &mut rng)
+            Dataset::sample(&system, "box", (&[[0.0, 1.0]; 3], &[[low, high]; 3]), 100, &mut rng)
         };
         let set = at(-1.0, 1.0).unwrap();
         assert!(set.v().chunks(3).all(|v| v.iter().map(|v| v * v).sum::<f64>() < 1.0));
@@ -599,14 +599,14 @@ mod tests {
 
     #[test]
     fn states_keep_what_their_motions_keep() {
-        let system = configure::<f64>("sphere-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("sphere-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.validation, config.data.test) = (2000, 10, 10);
         config.phases[0].position = vec![[0.2, PI - 0.2], [0.5, 13.5]];
         config.phases[0].velocity = vec![[-5.0, 5.0], [-15.0, 15.0]];
         let mut seen = |fraction: f64| {
             config.data.trajectory_fraction = fraction;
-            let (data, _) = sample_all::<f64>(&config, &system).unwrap();
+            let (data, _) = Datasets::<f64>::sample(&config, &system).unwrap();
             let set = &data.training[0];
             assert_eq!(set.len(), 2000);
             let (mut slow, mut turns, mut away) = (0, [0; 3], 0);
@@ -633,7 +633,7 @@ mod tests {
 
     #[test]
     fn spacetime_motions_are_on_the_shell_and_keep_their_momenta() {
-        let system = configure::<f64>("ads4-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("ads4-geodesic", &[]).unwrap();
         let bounds = (
             &[[-5.0, 5.0], [-5.0, 5.0], [-5.0, 5.0], [0.4, 6.0]][..],
             &[[0.0, 0.0], [-2.0, 2.0], [-2.0, 2.0], [-2.0, 2.0]][..],
@@ -653,14 +653,14 @@ mod tests {
 
     #[test]
     fn bounds_that_no_motion_passes_through_are_refused() {
-        let system = configure::<f64>("ads2-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("ads2-geodesic", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         (config.data.training, config.data.trajectory_fraction) = (500, 0.1);
         config.phases[0].position[1] = [5.0, 6.0];
-        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        let refused = Datasets::<f64>::sample(&config, &system).unwrap_err().to_string();
         assert!(refused.starts_with("phase[0].position: hardly any motion"), "{refused}");
         config.data.trajectory_fraction = f64::NAN;
-        let refused = sample_all::<f64>(&config, &system).unwrap_err().to_string();
+        let refused = Datasets::<f64>::sample(&config, &system).unwrap_err().to_string();
         assert!(refused.starts_with("data.trajectory_fraction: ") && refused.ends_with("found NaN"), "{refused}");
     }
 }

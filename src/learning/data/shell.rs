@@ -124,8 +124,7 @@ pub(crate) fn weigh_by_distance(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::sample_all;
-    use crate::lagrangian::configure;
+    use crate::data::Datasets;
     use crate::presets::Preset;
 
     /// Checks that velocities are future-directed and normalised, from inside the horizon outward, with distances uniform in their
@@ -133,10 +132,10 @@ mod tests {
     #[test]
     fn states_in_a_shell_are_time_like_and_of_all_distances() {
         for name in ["schwarzschild-cartesian", "kerr-cartesian", "reissner-nordstrom-cartesian"] {
-            let system = configure::<f64>(name, &[]).unwrap();
+            let system = SystemInstance::<f64>::named(name, &[]).unwrap();
             let mut config = Preset::Quick.config(&system).unwrap();
             (config.data.training, config.data.validation, config.data.test) = (4000, 100, 100);
-            let (data, scale) = sample_all::<f64>(&config, &system).unwrap();
+            let (data, scale) = Datasets::<f64>::sample(&config, &system).unwrap();
             let (set, exact, mut terms) = (&data.training[0], system.build().unwrap(), Terms::default());
             exact
                 .terms(set.q(), set.v(), Request::LAGRANGIAN | Request::MOMENTUM | Request::ACCELERATION, &mut terms)
@@ -176,12 +175,12 @@ mod tests {
 
     #[test]
     fn a_shell_needs_a_time_and_coordinates_of_the_system() {
-        let kepler = configure::<f64>("kepler", &[]).unwrap();
+        let kepler = SystemInstance::<f64>::named("kepler", &[]).unwrap();
         let mut config = Preset::Quick.config(&kepler).unwrap();
         let mut refused = |names: &[&str], radius: Option<[f64; 2]>| {
             config.data.shell = names.iter().map(|name| name.to_string()).collect();
             config.data.shell_radius = radius;
-            sample_all::<f64>(&config, &kepler).unwrap_err().to_string()
+            Datasets::<f64>::sample(&config, &kepler).unwrap_err().to_string()
         };
         let problem = refused(&["x", "y"], Some([1.0, 2.0]));
         assert_eq!(problem, "data.shell: expected a system with a time-like coordinate, found `kepler`");

@@ -1,10 +1,10 @@
 //! Presets: configurations that ship with the crate, and trainings on arrays of states by them ([`Trainer`]).
 //!
 //! ```
-//! use lnn::lagrangian::configure;
+//! use lnn::lagrangian::SystemInstance;
 //! use lnn::presets::Preset;
 //!
-//! let config = Preset::Quick.config(&configure("double-pendulum", &[])?).unwrap();
+//! let config = Preset::Quick.config(&SystemInstance::named("double-pendulum", &[])?).unwrap();
 //! assert!(config.phases[0].epochs > 0 && !config.network.hidden.is_empty());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

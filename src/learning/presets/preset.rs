@@ -284,12 +284,11 @@ fn paper(system: &SystemInstance<f64>) -> Option<Config> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::configure;
 
     #[test]
     fn structures_have_no_weight_decay_and_a_higher_clip_except_around_a_centre() {
         let choices = |name: &str, structure| {
-            let config = Preset::Quick.config_of(&configure(name, &[]).unwrap(), structure).unwrap();
+            let config = Preset::Quick.config_of(&SystemInstance::named(name, &[]).unwrap(), structure).unwrap();
             (config.optimizer.weight_decay, config.optimizer.clip, config.phases[0].rate)
         };
         assert_eq!(choices("double-pendulum", Structure::Mechanical), (0.0, 10.0, 5e-3));

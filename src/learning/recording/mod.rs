@@ -1,12 +1,12 @@
 //! Recorded motion, estimates of its derivatives, and a survey of its quality.
 //!
 //! ```
-//! use lnn::recording::{Columns, SmoothOptions, Smoothing, read_recording};
+//! use lnn::recording::{Columns, LoadedRecording, SmoothOptions, Smoothing};
 //!
 //! // Angles of a double pendulum every 10 ms, several runs in one file.
 //! let angles = ["theta1", "theta2"].map(String::from).to_vec();
 //! let columns = Columns { periodic: angles.clone(), coords: angles, trajectory: Some("run".into()), ..Columns::default() };
-//! let recording = read_recording(&["examples/data/pendulum.csv"], &columns)?.recording;
+//! let recording = LoadedRecording::read(&["examples/data/pendulum.csv"], &columns)?.recording;
 //! assert_eq!((recording.n(), recording.tracks[0].times[1]), (2, 0.01));
 //!
 //! let smoothing = Smoothing::choose(&recording, &SmoothOptions::default())?;
@@ -32,12 +32,12 @@ mod track;
 mod units;
 
 pub use columns::{Columns, ColumnsError};
-pub use guess::{ColumnGuess, Guess, guess};
+pub use guess::{ColumnGuess, Guess};
 pub(crate) use held::{Filled, filled, marks};
 pub(crate) use hermite::hermite;
 pub(crate) use hold_out::HeldOut;
 pub use hold_out::HoldOutError;
-pub use read::{DataError, Problem, read_recording};
+pub use read::{DataError, Problem};
 pub use reading::{Bridged, Cut, Dropped, LoadedRecording, Rows, Targets};
 pub use smooth::{SmoothError, SmoothOptions, Smoothed, Smoothing};
 pub(crate) use statistics::{deviation, quantile, rms, robust_deviation};

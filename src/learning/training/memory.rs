@@ -104,7 +104,7 @@ mod tests {
     use crate::presets::Preset;
 
     fn memory(change: impl FnOnce(&mut Config)) -> Option<u64> {
-        let system = crate::lagrangian::configure("double-pendulum", &[]).unwrap();
+        let system = crate::lagrangian::SystemInstance::named("double-pendulum", &[]).unwrap();
         let mut config = Preset::Quick.config(&system).unwrap();
         change(&mut config);
         training_memory(&config, &config.architecture(&system, vec![1.0; 2]).unwrap())

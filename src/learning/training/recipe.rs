@@ -1,7 +1,7 @@
 //! Trains a network by a configuration: data, shape, training.
 
 use crate::configuration::Config;
-use crate::data::{SamplingError, sample_all};
+use crate::data::{Datasets, SamplingError};
 use crate::lagrangian::SystemInstance;
 use crate::network::{NetworkError, NetworkLagrangian};
 use crate::scalar::Scalar;
@@ -41,7 +41,7 @@ pub enum RecipeError {
 /// [`RecipeError`].
 pub fn run<S: Scalar>(config: &Config, threads: usize, hooks: &Hooks) -> Result<TrainingResult<S>, RecipeError> {
     let system = config.system()?;
-    let (data, scale) = sample_all::<S>(config, &system)?;
+    let (data, scale) = Datasets::<S>::sample(config, &system)?;
     let architecture = config.architecture(&system, scale).map_err(SamplingError::Config)?;
     let trained = train(config, &architecture, config.penalty()?, data, threads, hooks)?;
     let model = NetworkLagrangian::new(architecture, trained.weights.clone())?;

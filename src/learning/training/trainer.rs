@@ -3,7 +3,7 @@
 use crate::configuration::Penalty;
 use crate::configuration::{Config, ConfigError};
 use crate::data::{Dataset, Datasets};
-use crate::network::{Architecture, initial_weights};
+use crate::network::Architecture;
 use crate::random::RngStream;
 use crate::scalar::Scalar;
 use crate::training::checkpoint::{CheckpointManager, Clock, Outcome, PhaseState, Snapshot};
@@ -132,7 +132,7 @@ pub fn resume<S: Scalar>(
     let ResumeOptions { checkpoints, start } = session;
     let Snapshot { seconds, mut outcome, in_progress } = start.unwrap_or_else(|| {
         let mut rng = RngStream::Weights.generator(config.seed);
-        let weights = initial_weights(architecture, config.network.initialization, &mut rng);
+        let weights = architecture.initial_weights(config.network.initialization, &mut rng);
         Snapshot { seconds: 0.0, outcome: Outcome::none(weights), in_progress: None }
     });
     let (pool, clock) = (objective::threads(threads)?, Clock::after(seconds));

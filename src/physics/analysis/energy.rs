@@ -30,15 +30,17 @@ impl EnergyError {
     }
 }
 
-/// Error of the exact system's energy along any trajectory, above all a learned one: `|E(t) - E(0)| / max(|E(0)|, scale)`.
-///
-/// `scale`, in units of energy, keeps the quotient meaningful where `E(0)` is near 0; a natural choice is the kinetic
-/// energy of a typical state.
-pub fn energy_error<S: Scalar>(exact: &dyn EulerLagrange<S>, trajectory: &Trajectory<S>, scale: S) -> EnergyError {
-    normalised(trajectory, &trajectory.energy_by(exact), scale)
+impl EnergyError {
+    /// Error of the exact system's energy along any trajectory, above all a learned one: `|E(t) - E(0)| / max(|E(0)|, scale)`.
+    ///
+    /// `scale`, in units of energy, keeps the quotient meaningful where `E(0)` is near 0; a natural choice is the kinetic
+    /// energy of a typical state.
+    pub fn of<S: Scalar>(exact: &dyn EulerLagrange<S>, trajectory: &Trajectory<S>, scale: S) -> EnergyError {
+        normalised(trajectory, &trajectory.energy_by(exact), scale)
+    }
 }
 
-/// As [`energy_error`], with the energies stored in the trajectory, those of the model that moved: how well the integration conserves the
+/// As [`EnergyError::of`], with the energies stored in the trajectory, those of the model that moved: how well the integration conserves the
 /// learned energy. Empty if none are stored.
 pub fn energy_drift<S: Scalar>(trajectory: &Trajectory<S>, scale: S) -> EnergyError {
     normalised(trajectory, trajectory.energy.as_deref().unwrap_or_default(), scale)
@@ -168,7 +170,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 mod tests {
     use super::*;
     use crate::analysis::StartBox;
-    use crate::lagrangian::{configure, systems};
+    use crate::lagrangian::System;
     use crate::models::{OSCILLATOR, PENDULUM};
     use crate::rollout::{RolloutOptions, rollout};
 
@@ -176,13 +178,13 @@ mod tests {
     fn exact_motion_keeps_it_and_foreign_motion_does_not() {
         let options = RolloutOptions::<f64>::reference(10.0, 0.1);
         let own = rollout(&PENDULUM, &[2.0], &[0.0], &options).trajectory;
-        let error = energy_error(&PENDULUM, &own, 0.0);
+        let error = EnergyError::of(&PENDULUM, &own, 0.0);
         assert!(error.statistics().max < 1e-10, "{:e}", error.statistics().max);
         assert!((error.initial + 2.0_f64.cos()).abs() < 1e-15);
         assert!(energy_drift(&own, 0.0).statistics().max < 1e-10);
 
         let foreign = rollout(&OSCILLATOR, &[2.0], &[0.0], &options).trajectory;
-        let error = energy_error(&PENDULUM, &foreign, 0.0);
+        let error = EnergyError::of(&PENDULUM, &foreign, 0.0);
         // At the lowest point: kinetic 2, potential -1, against -cos 2.
         let expected = (1.0 + 2.0_f64.cos()) / 2.0_f64.cos().abs();
         assert!((error.statistics().max - expected).abs() < 0.02 * expected, "{:?}", error.statistics());
@@ -192,19 +194,19 @@ mod tests {
     #[test]
     fn the_scale_bounds_the_denominator() {
         let still = Trajectory { coordinates: 1, t: vec![0.0, 1.0], q: vec![0.0, 1.0], v: vec![0.0; 2], energy: None };
-        assert_eq!(energy_error(&OSCILLATOR, &still, 2.0).error, [0.0, 0.25]);
+        assert_eq!(EnergyError::of(&OSCILLATOR, &still, 2.0).error, [0.0, 0.25]);
         assert!(energy_drift(&still, 1.0).error.is_empty());
     }
 
     #[test]
     fn exact_motion_keeps_it() {
         let mut seen = Vec::new();
-        for system in systems().iter().filter(|system| system.conserved.is_some()) {
+        for system in System::all().iter().filter(|system| system.conserved.is_some()) {
             let (n, parameters) = (system.size.default(), &system.parameters);
             // Other values than the defaults, which are mostly 1.
             let given: Vec<(String, String)> =
                 parameters.iter().map(|p| (p.symbol.to_string(), "1.25".into())).collect();
-            let system = configure::<f64>(&system.name, &given).unwrap();
+            let system = SystemInstance::<f64>::named(&system.name, &given).unwrap();
             let (exact, test) = (system.build().unwrap(), system.system.trajectory(n));
             let bounds = StartBox { q: test.start.positions, v: test.start.velocities };
             for (q, mut v) in bounds.starts::<f64>(4, 5) {
@@ -228,7 +230,7 @@ mod tests {
 
     #[test]
     fn a_great_circle_left_by_an_angle_shows_that_angle() {
-        let system = configure::<f64>("sphere-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("sphere-geodesic", &[]).unwrap();
         // Along the equator, then along a circle tilted by 0.01.
         let (q, v) = (vec![1.0, 0.3, 1.0, 0.3], vec![0.0, 2.0, 0.0, 2.0]);
         let mut trajectory = Trajectory { coordinates: 2, t: vec![0.0, 1.0], q, v, energy: None };
@@ -238,6 +240,6 @@ mod tests {
         let error = conserved_error(&system, &trajectory).unwrap();
         assert_eq!(error[0], 0.0);
         assert!((error[1] - 2.0 * 0.005_f64.sin()).abs() < 1e-15, "{error:?}");
-        assert!(conserved_error(&configure::<f64>("double-pendulum", &[]).unwrap(), &trajectory).is_none());
+        assert!(conserved_error(&SystemInstance::<f64>::named("double-pendulum", &[]).unwrap(), &trajectory).is_none());
     }
 }

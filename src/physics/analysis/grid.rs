@@ -4,7 +4,7 @@ use super::AffineFit;
 use super::statistics::quantile;
 use super::terms::matrices_at_rest;
 use super::thresholds::{METRIC_ROUNDING, MOST_AXIS_POINTS, POINTS_AT_ONCE};
-use crate::geometry::{at_once, geometries};
+use crate::geometry::{Geometry, at_once};
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Workspace, leading_minors};
 use crate::scalar::Scalar;
@@ -217,7 +217,7 @@ pub(crate) fn curvature_scalars(model: &dyn EulerLagrange<f64>, q: &[f64]) -> Ve
     let n = model.coordinates();
     let rest = vec![0.0; n];
     let scalars = |points: &[f64]| -> Vec<f64> {
-        match geometries(model, points, &rest) {
+        match Geometry::of(model, points, &rest) {
             Ok(found) => found.iter().map(|point| point.as_ref().map_or(f64::NAN, |g| g.curvature.scalar)).collect(),
             Err(_) => vec![f64::NAN; points.len() / n],
         }
@@ -303,7 +303,7 @@ pub(crate) fn metric_components(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{Lagrangian, Mechanics, configure};
+    use crate::lagrangian::{Lagrangian, Mechanics, SystemInstance};
     use crate::models::{PENDULUM, SINGULAR};
     use crate::scalar::Real;
 
@@ -422,7 +422,7 @@ mod tests {
         let (q, v) = ([0.5, 0.0, 1.0, 2.0], [1.0, 0.3, -0.2, 0.4]);
         assert!(is_metric(&sphere(1.0, 0.0), &q, &v) && !is_metric(&sphere(1.0, 0.1), &q, &v));
         for (name, metric) in [("ads4-geodesic", true), ("schwarzschild-geodesic", true), ("charged-particle", false)] {
-            let system = configure::<f64>(name, &[]).unwrap();
+            let system = SystemInstance::<f64>::named(name, &[]).unwrap();
             let model = system.build().unwrap();
             let n = system.coordinates;
             let q: Vec<f64> = (0..n).map(|i| 4.0 + 0.1 * i as f64).collect();

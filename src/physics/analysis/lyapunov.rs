@@ -27,68 +27,70 @@ impl Lyapunov {
     }
 }
 
-/// Largest finite-time Lyapunov exponent of the motion from `(q, v)` by two nearby trajectories.
-///
-/// The neighbour starts at the relative distance `sqrt(eps)` and is pulled back to it after every `options.dt` (Benettin et al. 1980); the
-/// exponent is the mean of the logarithms of the growth per time. The separation is measured geometrically, independently of the chart: for
-/// a neighbour at `dq` its square is `|dq|^2 + |Dv|^2` in the mass matrix, with `Dv = dv + G(v, dq)` the covariant change of the velocity,
-/// so that a great circle is as regular in angles as in any other coordinates. A mass matrix that is not positive definite is replaced by
-/// the lengths for an observer of velocity `v`, or else by the magnitudes of its eigenvalues. Regular motion gives about `ln(t) / t`, not
-/// 0.
-///
-/// # Errors
-/// The error of the roll-out that fails first.
-pub fn lyapunov<S: Integrable>(
-    model: &dyn EulerLagrange<S>,
-    q: &[S],
-    v: &[S],
-    options: &RolloutOptions<S>,
-) -> Result<Lyapunov, RolloutError> {
-    let main = rollout(model, q, v, &options.clone().energy(false)).complete()?;
-    let n = main.coordinates;
-    let size = |state: &[f64]| state.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let flat = |k: usize| -> Vec<f64> {
-        let (q, v) = main.state(k);
-        q.iter().chain(v).map(|x| x.to_f64()).collect()
-    };
-    let distance = S::epsilon().to_f64().sqrt() * size(&flat(0)).max(1.0);
-    // A fixed direction without symmetry.
-    let mut offset: Vec<f64> = (0..2 * n).map(|i| 1.0 / (1.0 + i as f64).sqrt()).collect();
-    let norm = size(&offset);
-    offset.iter_mut().for_each(|x| *x *= distance / norm);
+impl Lyapunov {
+    /// Largest finite-time Lyapunov exponent of the motion from `(q, v)` by two nearby trajectories.
+    ///
+    /// The neighbour starts at the relative distance `sqrt(eps)` and is pulled back to it after every `options.dt` (Benettin et al. 1980); the
+    /// exponent is the mean of the logarithms of the growth per time. The separation is measured geometrically, independently of the chart: for
+    /// a neighbour at `dq` its square is `|dq|^2 + |Dv|^2` in the mass matrix, with `Dv = dv + G(v, dq)` the covariant change of the velocity,
+    /// so that a great circle is as regular in angles as in any other coordinates. A mass matrix that is not positive definite is replaced by
+    /// the lengths for an observer of velocity `v`, or else by the magnitudes of its eigenvalues. Regular motion gives about `ln(t) / t`, not
+    /// 0.
+    ///
+    /// # Errors
+    /// The error of the roll-out that fails first.
+    pub fn of<S: Integrable>(
+        model: &dyn EulerLagrange<S>,
+        q: &[S],
+        v: &[S],
+        options: &RolloutOptions<S>,
+    ) -> Result<Lyapunov, RolloutError> {
+        let main = rollout(model, q, v, &options.clone().energy(false)).complete()?;
+        let n = main.coordinates;
+        let size = |state: &[f64]| state.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let flat = |k: usize| -> Vec<f64> {
+            let (q, v) = main.state(k);
+            q.iter().chain(v).map(|x| x.to_f64()).collect()
+        };
+        let distance = S::epsilon().to_f64().sqrt() * size(&flat(0)).max(1.0);
+        // A fixed direction without symmetry.
+        let mut offset: Vec<f64> = (0..2 * n).map(|i| 1.0 / (1.0 + i as f64).sqrt()).collect();
+        let norm = size(&offset);
+        offset.iter_mut().for_each(|x| *x *= distance / norm);
 
-    let mut growth = 0.0;
-    // Separations keep this size, unless their coordinates would become too large where lengths change fast with the chart.
-    let unit = Separation::new(model, &flat(0)).size(&offset);
-    let mut before = unit;
-    for k in 0..main.len().saturating_sub(1) {
-        let shifted: Vec<S> = flat(k).iter().zip(&offset).map(|(x, d)| S::of_f64(x + d)).collect();
-        let (t, t_end) = (main.t[k], main.t[k + 1]);
-        let leap = options.clone().t0(t).t_end(t_end).dt(t_end - t).energy(false).domain(None::<Domain<S>>);
-        // Both restart at each sample, so that earlier errors do not count as growth.
-        let ends: Vec<Vec<f64>> = [flat(k).iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>(), shifted]
-            .into_iter()
-            .map(|start| {
-                let end = rollout(model, &start[..n], &start[n..], &leap).complete()?;
-                let (q, v) = end.state(end.len() - 1);
-                Ok(q.iter().chain(v).map(|x| x.to_f64()).collect())
-            })
-            .collect::<Result<_, RolloutError>>()?;
-        let separation = Separation::new(model, &ends[0]);
-        offset = ends[1].iter().zip(&ends[0]).map(|(a, b)| a - b).collect();
-        let now = separation.size(&offset);
-        if now > 0.0 && now.is_finite() && before > 0.0 {
-            growth += (now / before).ln();
-            let shrink = (now / unit).max(size(&offset) / (WIDEST_SEPARATION * distance));
-            offset.iter_mut().for_each(|x| *x /= shrink);
-            before = now / shrink;
-        } else {
-            offset = vec![distance / (2.0 * n as f64).sqrt(); 2 * n];
-            before = separation.size(&offset);
+        let mut growth = 0.0;
+        // Separations keep this size, unless their coordinates would become too large where lengths change fast with the chart.
+        let unit = Separation::new(model, &flat(0)).size(&offset);
+        let mut before = unit;
+        for k in 0..main.len().saturating_sub(1) {
+            let shifted: Vec<S> = flat(k).iter().zip(&offset).map(|(x, d)| S::of_f64(x + d)).collect();
+            let (t, t_end) = (main.t[k], main.t[k + 1]);
+            let leap = options.clone().t0(t).t_end(t_end).dt(t_end - t).energy(false).domain(None::<Domain<S>>);
+            // Both restart at each sample, so that earlier errors do not count as growth.
+            let ends: Vec<Vec<f64>> = [flat(k).iter().map(|&x| S::of_f64(x)).collect::<Vec<S>>(), shifted]
+                .into_iter()
+                .map(|start| {
+                    let end = rollout(model, &start[..n], &start[n..], &leap).complete()?;
+                    let (q, v) = end.state(end.len() - 1);
+                    Ok(q.iter().chain(v).map(|x| x.to_f64()).collect())
+                })
+                .collect::<Result<_, RolloutError>>()?;
+            let separation = Separation::new(model, &ends[0]);
+            offset = ends[1].iter().zip(&ends[0]).map(|(a, b)| a - b).collect();
+            let now = separation.size(&offset);
+            if now > 0.0 && now.is_finite() && before > 0.0 {
+                growth += (now / before).ln();
+                let shrink = (now / unit).max(size(&offset) / (WIDEST_SEPARATION * distance));
+                offset.iter_mut().for_each(|x| *x /= shrink);
+                before = now / shrink;
+            } else {
+                offset = vec![distance / (2.0 * n as f64).sqrt(); 2 * n];
+                before = separation.size(&offset);
+            }
         }
+        let time = (options.t_end - options.t0).abs().to_f64();
+        Ok(Lyapunov { exponent: if time > 0.0 { growth / time } else { 0.0 }, time })
     }
-    let time = (options.t_end - options.t0).abs().to_f64();
-    Ok(Lyapunov { exponent: if time > 0.0 { growth / time } else { 0.0 }, time })
 }
 
 /// Measures separations of neighbours of one state.
@@ -189,7 +191,7 @@ fn lengths(n: usize, mass: &[f64], v: &[f64]) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{MechanicsError, build};
+    use crate::lagrangian::{MechanicsError, SystemInstance};
     use crate::models::OSCILLATOR;
     use crate::random::RngStream;
     use rand::Rng;
@@ -211,10 +213,10 @@ mod tests {
     #[test]
     fn exponents_of_linear_motions() {
         let options = RolloutOptions::reference(10.0, 0.5);
-        let hill = lyapunov(&Hill, &[0.0], &[0.0], &options).unwrap();
+        let hill = Lyapunov::of(&Hill, &[0.0], &[0.0], &options).unwrap();
         assert!((hill.exponent - 1.0).abs() < 0.05, "{hill:?}");
         assert!((hill.lyapunov_time() - 1.0).abs() < 0.05);
-        let calm = lyapunov(&OSCILLATOR, &[1.0], &[0.0], &RolloutOptions::<f64>::reference(20.0, 0.5)).unwrap();
+        let calm = Lyapunov::of(&OSCILLATOR, &[1.0], &[0.0], &RolloutOptions::<f64>::reference(20.0, 0.5)).unwrap();
         assert!(calm.exponent.abs() < 1e-3, "{calm:?}");
         assert!(hill.is_chaotic() && !calm.is_chaotic());
         // In proportion to time, over a long span.
@@ -224,13 +226,13 @@ mod tests {
     /// Great circles of all inclinations, including those near the poles of the chart, and geodesics of the plane in polar coordinates.
     #[test]
     fn a_great_circle_is_regular_in_any_chart() {
-        let sphere = build::<f64>("sphere-geodesic", &[]).unwrap();
+        let sphere = SystemInstance::<f64>::named("sphere-geodesic", &[]).unwrap().build().unwrap();
         let mut rng = RngStream::Test.generator(8);
         for k in 0..6 {
             let turn = [0.005, 0.02, 1.0][k % 3];
             let (polar, rate) = (rng.random_range(0.6..2.5), rng.random_range(0.5..1.5));
             let state = ([polar, 0.3], [rate, turn * rng.random_range(0.5..1.0)]);
-            let found = lyapunov(&*sphere, &state.0, &state.1, &RolloutOptions::reference(60.0, 0.5)).unwrap();
+            let found = Lyapunov::of(&*sphere, &state.0, &state.1, &RolloutOptions::reference(60.0, 0.5)).unwrap();
             assert!(!found.is_chaotic() && found.exponent < 0.09, "{state:?} {found:?}");
         }
     }
@@ -238,8 +240,8 @@ mod tests {
     /// The exponent of a chaotic motion does not depend on the coordinates; neighbours in the plane separate as before.
     #[test]
     fn a_thrown_double_pendulum_is_chaotic() {
-        let pendulum = build::<f64>("double-pendulum", &[]).unwrap();
-        let found = lyapunov(&*pendulum, &[2.0, 2.5], &[0.0, 0.0], &RolloutOptions::reference(40.0, 0.25)).unwrap();
+        let pendulum = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
+        let found = Lyapunov::of(&*pendulum, &[2.0, 2.5], &[0.0, 0.0], &RolloutOptions::reference(40.0, 0.25)).unwrap();
         assert!(found.is_chaotic(), "{found:?}");
     }
 }

@@ -92,30 +92,28 @@ pub(crate) fn nearest_factor(size: usize, exact: &[f64], learned: &[f64]) -> f64
     product / square
 }
 
-/// Compares the matrices at rest at the positions `q`, `(states, n)`.
-pub fn mass_matrix_error<S: Scalar>(
-    exact: &dyn EulerLagrange<S>,
-    learned: &dyn EulerLagrange<S>,
-    q: &[S],
-) -> MassMatrixError {
-    let n = exact.coordinates();
-    let (of_exact, mut of_learned) = (matrices_at_rest(exact, q), matrices_at_rest(learned, q));
-    // Any velocities that show which coordinates act on which.
-    let v: Vec<S> = (0..q.len()).map(|k| S::of_f64(0.3 * (1.0 + 2.4 * k as f64).cos())).collect();
-    let groups = groups(exact, (q, &v));
-    if groups.len() < 2 {
-        return compare(n, n * n, &of_exact, &of_learned);
-    }
-    let factors = group_factors(n, &groups, &of_learned, &of_exact);
-    let mut of_coordinate = vec![1.0; n];
-    groups.iter().zip(&factors).for_each(|(group, s)| group.iter().for_each(|&i| of_coordinate[i] = *s));
-    for matrix in of_learned.chunks_exact_mut(n * n) {
-        for (at, m) in matrix.iter_mut().enumerate() {
-            *m *= element_factor(of_coordinate[at / n], of_coordinate[at % n]);
+impl MassMatrixError {
+    /// Compares the matrices at rest at the positions `q`, `(states, n)`.
+    pub fn of<S: Scalar>(exact: &dyn EulerLagrange<S>, learned: &dyn EulerLagrange<S>, q: &[S]) -> MassMatrixError {
+        let n = exact.coordinates();
+        let (of_exact, mut of_learned) = (matrices_at_rest(exact, q), matrices_at_rest(learned, q));
+        // Any velocities that show which coordinates act on which.
+        let v: Vec<S> = (0..q.len()).map(|k| S::of_f64(0.3 * (1.0 + 2.4 * k as f64).cos())).collect();
+        let groups = groups(exact, (q, &v));
+        if groups.len() < 2 {
+            return compare(n, n * n, &of_exact, &of_learned);
         }
+        let factors = group_factors(n, &groups, &of_learned, &of_exact);
+        let mut of_coordinate = vec![1.0; n];
+        groups.iter().zip(&factors).for_each(|(group, s)| group.iter().for_each(|&i| of_coordinate[i] = *s));
+        for matrix in of_learned.chunks_exact_mut(n * n) {
+            for (at, m) in matrix.iter_mut().enumerate() {
+                *m *= element_factor(of_coordinate[at / n], of_coordinate[at % n]);
+            }
+        }
+        let found = compare_scaled(n * n, &of_exact, &of_learned, 1.0);
+        MassMatrixError { factor: factors[0], groups: groups.len(), factors: of_coordinate, ..found }
     }
-    let found = compare_scaled(n * n, &of_exact, &of_learned, 1.0);
-    MassMatrixError { factor: factors[0], groups: groups.len(), factors: of_coordinate, ..found }
 }
 
 /// Compares the matrices within the directions that the constraints leave, at states `q`, `v`, `(states, n)`.
@@ -313,10 +311,10 @@ mod tests {
         // With `c` the coordinates act on each other.
         let exact = model(1.0, 0.5, 0.1);
         // A difference that vanishes at rest does not count.
-        let same = mass_matrix_error(&exact, &model(-4.0, -2.0, 7.0), &q);
+        let same = MassMatrixError::of(&exact, &model(-4.0, -2.0, 7.0), &q);
         assert_eq!((same.factor, same.error.max, same.error.count, same.error.failed), (-0.25, 0.0, 3, 0));
         assert_eq!(same.factors, [-0.25; 2]);
-        let other = mass_matrix_error(&exact, &model(1.0, 0.0, 0.0), &q);
+        let other = MassMatrixError::of(&exact, &model(1.0, 0.0, 0.0), &q);
         // M_exact = diag(1 + q/2, 1) against s times the unit matrix.
         let squares = [2.0, 1.5f64.powi(2) + 1.0, 2.5f64.powi(2) + 1.0];
         let traces = [2.0, 2.5, 3.5];
@@ -326,7 +324,7 @@ mod tests {
         let relative: Vec<f64> = errors.iter().zip(squares).map(|(e, x)| e / x.sqrt()).collect();
         assert!((other.error.mean - relative.iter().sum::<f64>() / 3.0).abs() < 1e-14);
         assert!((other.error.max - relative.iter().fold(0.0f64, |m, &x| m.max(x))).abs() < 1e-14);
-        let broken = mass_matrix_error(&exact, &model(f64::NAN, 0.0, 0.0), &q);
+        let broken = MassMatrixError::of(&exact, &model(f64::NAN, 0.0, 0.0), &q);
         assert_eq!((broken.error.count, broken.error.failed), (0, 3));
     }
 
@@ -347,11 +345,11 @@ mod tests {
     fn every_group_has_a_factor_of_its_own() {
         let model = |a, b, joined| Mechanics::<_, f64>::new(Two, vec![a, b, joined]);
         let q = [1.0, 0.3, -0.4, 0.8, 0.2, -1.1, 0.7, 0.5];
-        let found = mass_matrix_error(&model(1.0, 1.0, 0.0), &model(2.0, -1e-7, 0.0), &q);
+        let found = MassMatrixError::of(&model(1.0, 1.0, 0.0), &model(2.0, -1e-7, 0.0), &q);
         assert!((found.factor - 0.5).abs() < 1e-12 && found.groups == 2 && found.error.max < 1e-12, "{found:?}");
         assert!((found.factors[1] / -1e7 - 1.0).abs() < 1e-12 && found.factors.len() == 2, "{found:?}");
         assert_eq!((element_factor(4.0, 9.0), element_factor(-2.0, -2.0)), (6.0, -2.0));
-        let joined = mass_matrix_error(&model(1.0, 1.0, 0.1), &model(2.0, 0.2, 0.1), &q);
+        let joined = MassMatrixError::of(&model(1.0, 1.0, 0.1), &model(2.0, 0.2, 0.1), &q);
         assert!(joined.groups == 1 && joined.error.median > 0.3, "{joined:?}");
     }
 

@@ -5,8 +5,8 @@ use super::thresholds::{
     RENORMALISATIONS, RUNS_AT_ONCE, SEPARATION_TOLERANCE,
 };
 use super::{
-    CoordinateError, EnergyError, Lyapunov, Statistics, ValidTime, coordinate_error, energy_drift, energy_error,
-    lyapunov, relative_error, spread, statistics, valid_time, velocity_error,
+    CoordinateError, EnergyError, Lyapunov, Statistics, ValidTime, coordinate_error, energy_drift, relative_error,
+    spread, statistics, valid_time, velocity_error,
 };
 use crate::lagrangian::{EulerLagrange, SystemError, SystemInstance, project};
 use crate::random::RngStream;
@@ -195,10 +195,14 @@ impl<S: Integrable> TrajectoryTest<S> {
                 let relative = self.relative(&truth.trajectory, &learned.trajectory);
                 TrajectoryRun {
                     velocities: velocity_error(&truth.trajectory, &learned.trajectory),
-                    energy: energy_error(exact, &learned.trajectory, scale),
+                    energy: EnergyError::of(exact, &learned.trajectory, scale),
                     reference_energy: energy_drift(&truth.trajectory, scale),
                     drift: energy_drift(&learned.trajectory, scale),
-                    lyapunov: if self.lyapunov { lyapunov(exact, q, v, &self.leaps(&reference)).ok() } else { None },
+                    lyapunov: if self.lyapunov {
+                        Lyapunov::of(exact, q, v, &self.leaps(&reference)).ok()
+                    } else {
+                        None
+                    },
                     valid: valid_time(&coordinates.t, relative.iter().copied(), learned.stop.is_none()),
                     coordinates,
                     relative,
@@ -353,7 +357,6 @@ fn nth_turn<S: Scalar>(trajectory: &Trajectory<S>, periodic: &[bool], most: usiz
 mod tests {
     use super::*;
     use crate::analysis::{Lyapunov, StartBox, ValidTime};
-    use crate::lagrangian::configure;
     use crate::models::{OSCILLATOR, PENDULUM, SINGULAR};
 
     fn test() -> TrajectoryTest<f64> {
@@ -399,7 +402,7 @@ mod tests {
 
     #[test]
     fn relativistic_starts_are_on_the_mass_shell() {
-        let system = configure::<f64>("ads3-geodesic", &[]).unwrap();
+        let system = SystemInstance::<f64>::named("ads3-geodesic", &[]).unwrap();
         let exact = system.build().unwrap();
         let start = system.system.trajectory(3).start;
         // Nothing drawn for the velocity of t is used.

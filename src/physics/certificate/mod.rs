@@ -18,15 +18,14 @@
 //! # Example
 //!
 //! ```
-//! use lnn::certificate::{CertificateOptions, Signature, Verdict, certify_system};
-//! use lnn::lagrangian::configure;
-//! use lnn::lagrangian::Bounds;
+//! use lnn::certificate::{Certificate, CertificateOptions, Signature, Verdict};
+//! use lnn::lagrangian::{Bounds, SystemInstance};
 //!
-//! let pendulum = configure::<f64>("double-pendulum", &[])?;
+//! let pendulum = SystemInstance::<f64>::named("double-pendulum", &[])?;
 //! let region = Bounds::uniform(2, (-3.2, 3.2), (-9.0, 9.0)); // rad, rad/s
 //! let mut options = CertificateOptions::new(Signature { positive: 2, negative: 0 });
 //! options.boxes = 20_000;
-//! let found = certify_system(&pendulum, &region, &options)?;
+//! let found = Certificate::of_system(&pendulum, &region, &options)?;
 //! assert_eq!((found.certified, found.refuted, found.open), (1.0, 0.0, 0.0));
 //! // M = [[2, c], [c, 1]] with c = cos(theta1 - theta2): the largest condition number is 6.854, at c = 1.
 //! assert!(found.condition.unwrap() > 6.854);
@@ -46,7 +45,7 @@ mod search;
 mod spectrum;
 mod thresholds;
 
-pub use models::{Guarded, certify_network};
+pub use models::Guarded;
 pub use search::Verdict;
 
 use crate::lagrangian::system::Bounds;
@@ -235,42 +234,48 @@ impl std::fmt::Display for CertificateError {
 
 impl std::error::Error for CertificateError {}
 
-/// Proves in which parts of a region the mass matrix of a Lagrangian has its signature.
-///
-/// `parameters` are those of the Lagrangian; a parameter that no `f64` equals is enclosed.
-///
-/// # Errors
-/// [`CertificateError`] for a region, a signature or a condition number that does not fit.
-pub fn certify<L: Lagrangian, S: Scalar>(
-    lagrangian: &L,
-    parameters: &[S],
-    region: &Bounds,
-    options: &CertificateOptions<'_>,
-) -> Result<Certificate, CertificateError> {
-    let bounds = checked(lagrangian.coordinates(), region, options)?;
-    Ok(certificate(&Source::new(lagrangian, parameters), vec![(bounds, 1.0)], options))
+impl Certificate {
+    /// Proves in which parts of a region the mass matrix of a Lagrangian has its signature.
+    ///
+    /// `parameters` are those of the Lagrangian; a parameter that no `f64` equals is enclosed.
+    ///
+    /// # Errors
+    /// [`CertificateError`] for a region, a signature or a condition number that does not fit.
+    pub fn of<L: Lagrangian, S: Scalar>(
+        lagrangian: &L,
+        parameters: &[S],
+        region: &Bounds,
+        options: &CertificateOptions<'_>,
+    ) -> Result<Certificate, CertificateError> {
+        let bounds = checked(lagrangian.coordinates(), region, options)?;
+        Ok(certificate(&Source::new(lagrangian, parameters), vec![(bounds, 1.0)], options))
+    }
 }
 
-/// As [`certify`], for a system from the catalogue or from its description.
-///
-/// # Errors
-/// Those of [`certify`], [`CertificateError::NoLagrangian`] and [`CertificateError::Timed`].
-pub fn certify_system<S: Scalar>(
-    configured: &SystemInstance<S>,
-    region: &Bounds,
-    options: &CertificateOptions<'_>,
-) -> Result<Certificate, CertificateError> {
-    struct Certify<'a, S>(&'a [S], &'a Bounds, &'a CertificateOptions<'a>);
-    impl<S: Scalar> LagrangianVisitor for Certify<'_, S> {
-        type Output = Result<Certificate, CertificateError>;
-        fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output {
-            certify(lagrangian, self.0, self.1, self.2)
+impl Certificate {
+    /// As [`Certificate::of`], for a system from the catalogue or from its description.
+    ///
+    /// # Errors
+    /// Those of [`Certificate::of`], [`CertificateError::NoLagrangian`] and [`CertificateError::Timed`].
+    pub fn of_system<S: Scalar>(
+        configured: &SystemInstance<S>,
+        region: &Bounds,
+        options: &CertificateOptions<'_>,
+    ) -> Result<Certificate, CertificateError> {
+        struct Certify<'a, S>(&'a [S], &'a Bounds, &'a CertificateOptions<'a>);
+        impl<S: Scalar> LagrangianVisitor for Certify<'_, S> {
+            type Output = Result<Certificate, CertificateError>;
+            fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output {
+                Certificate::of(lagrangian, self.0, self.1, self.2)
+            }
         }
+        if configured.is_timed() {
+            return Err(CertificateError::Timed);
+        }
+        configured
+            .visit(Certify(&configured.parameters, region, options))
+            .unwrap_or(Err(CertificateError::NoLagrangian))
     }
-    if configured.is_timed() {
-        return Err(CertificateError::Timed);
-    }
-    configured.visit(Certify(&configured.parameters, region, options)).unwrap_or(Err(CertificateError::NoLagrangian))
 }
 
 /// The bounds of positions, then of velocities, if region and options fit the number of coordinates.

@@ -10,33 +10,35 @@ use crate::network::{Architecture, NetworkLagrangian};
 use crate::scalar::Scalar;
 use std::f64::consts::TAU;
 
-/// As [`certify`](super::certify), for a network with its weights.
-///
-/// The structures `mechanical` and `metric` have their signature by construction: `M = S C eta C^T S` with `S` the reciprocal scales, `eta`
-/// the signs and `C` lower triangular, its diagonal `softplus(c_ii) + 10^-3 > 0`, so that `C` is not singular whatever the network's finite
-/// outputs are, and `M` has the signs of `eta` (Sylvester). This holds unless a known Lagrangian is added. If this signature is requested
-/// without a condition number, nothing is evaluated.
-///
-/// A coordinate that the network takes as an angle, without its sine and cosine, is first reduced to one turn; a region that crosses the
-/// end of a turn is cut there, and witnesses are given in that turn.
-///
-/// # Errors
-/// Returns the same errors as [`certify`](super::certify).
-pub fn certify_network<S: Scalar>(
-    network: &NetworkLagrangian<S>,
-    region: &Bounds,
-    options: &CertificateOptions<'_>,
-) -> Result<Certificate, CertificateError> {
-    let architecture = network.architecture();
-    let bounds = checked(architecture.coordinates, region, options)?;
-    let by_construction = signature_by_construction(architecture) == Some(options.signature);
-    if by_construction && options.condition.is_none() {
-        return Ok(proven(options.signature, bounds));
+impl Certificate {
+    /// As [`Certificate::of`](super::Certificate::of), for a network with its weights.
+    ///
+    /// The structures `mechanical` and `metric` have their signature by construction: `M = S C eta C^T S` with `S` the reciprocal scales, `eta`
+    /// the signs and `C` lower triangular, its diagonal `softplus(c_ii) + 10^-3 > 0`, so that `C` is not singular whatever the network's finite
+    /// outputs are, and `M` has the signs of `eta` (Sylvester). This holds unless a known Lagrangian is added. If this signature is requested
+    /// without a condition number, nothing is evaluated.
+    ///
+    /// A coordinate that the network takes as an angle, without its sine and cosine, is first reduced to one turn; a region that crosses the
+    /// end of a turn is cut there, and witnesses are given in that turn.
+    ///
+    /// # Errors
+    /// Returns the same errors as [`Certificate::of`](super::Certificate::of).
+    pub fn of_network<S: Scalar>(
+        network: &NetworkLagrangian<S>,
+        region: &Bounds,
+        options: &CertificateOptions<'_>,
+    ) -> Result<Certificate, CertificateError> {
+        let architecture = network.architecture();
+        let bounds = checked(architecture.coordinates, region, options)?;
+        let by_construction = signature_by_construction(architecture) == Some(options.signature);
+        if by_construction && options.condition.is_none() {
+            return Ok(proven(options.signature, bounds));
+        }
+        let wrapped: Vec<bool> = (0..architecture.coordinates).map(|i| wraps(architecture, i)).collect();
+        let source = Source::new(architecture, network.weights());
+        let found = certificate(&source, turns(&wrapped, bounds), options);
+        Ok(Certificate { by_construction, wrapped, ..found })
     }
-    let wrapped: Vec<bool> = (0..architecture.coordinates).map(|i| wraps(architecture, i)).collect();
-    let source = Source::new(architecture, network.weights());
-    let found = certificate(&source, turns(&wrapped, bounds), options);
-    Ok(Certificate { by_construction, wrapped, ..found })
 }
 
 /// The signature that the structure proves.
@@ -167,15 +169,15 @@ impl<S: Scalar, M: EulerLagrange<S>> EulerLagrange<S> for Guarded<'_, M> {
 mod tests {
     use super::*;
     use crate::certificate::tests::{formula, limited};
-    use crate::certificate::{Bounds, Signature, certify, certify_system};
-    use crate::lagrangian::{Mechanics, configure};
+    use crate::certificate::{Bounds, Signature};
+    use crate::lagrangian::{Mechanics, SystemInstance};
 
     #[test]
     fn a_guarded_model_fails_where_nothing_is_certified() {
         // M = diag(1 - q_0^2/4, 1) is certified within |q_0| < 2, and the region ends at 3.
         let system = formula("(1 - x^2/4)*x_dot^2/2 + y_dot^2/2 - x*y");
         let region = Bounds { positions: vec![(-3.0, 3.0), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
-        let found = certify(&system, &[] as &[f64], &region, &limited(Signature::of(2, false), 4000)).unwrap();
+        let found = Certificate::of(&system, &[] as &[f64], &region, &limited(Signature::of(2, false), 4000)).unwrap();
         let guarded = Guarded::new(Mechanics::<_, f64>::new(system, vec![]), &found);
         let (q, v) = ([0.5, 0.0, 2.5, 0.0, 0.5, 1.5], [0.1, 0.2, 0.1, 0.2, 0.0, 0.0]);
         let [mut plain, mut terms] = [Terms::default(), Terms::default()];
@@ -196,9 +198,9 @@ mod tests {
     #[test]
     fn integrators_stop_where_the_certificate_ends() {
         use crate::rollout::{self, Integrator, RolloutError, rollout};
-        let pendulum = configure::<f64>("double-pendulum", &[]).unwrap();
+        let pendulum = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap();
         let region = Bounds::uniform(2, (-3.2, 3.2), (-2.0, 2.0));
-        let found = certify_system(&pendulum, &region, &limited(Signature::of(2, false), 1000)).unwrap();
+        let found = Certificate::of_system(&pendulum, &region, &limited(Signature::of(2, false), 1000)).unwrap();
         assert_eq!(found.certified, 1.0);
         let guarded = Guarded::new(pendulum.build().unwrap(), &found);
         for (method, slack) in [(Integrator::Dopri5, 1e-3), (Integrator::Dop853, 1e-3), (Integrator::Gauss4, 0.2)] {

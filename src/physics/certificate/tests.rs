@@ -6,9 +6,7 @@ use super::spectrum::{Enclose, Source, mass_matrix_enclosure};
 use super::*;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Inertia, inertia};
-use crate::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure, initial_weights,
-};
+use crate::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure};
 use crate::scalar::{Dd, Real};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -89,8 +87,8 @@ impl LagrangianVisitor for Check<'_> {
 
 #[test]
 fn systems_are_enclosed() {
-    for system in crate::lagrangian::systems() {
-        let configured = crate::lagrangian::configure::<f64>(&system.name, &[]).unwrap();
+    for system in crate::lagrangian::System::all() {
+        let configured = crate::lagrangian::SystemInstance::<f64>::named(&system.name, &[]).unwrap();
         configured.visit(Check(&configured)).unwrap();
     }
 }
@@ -114,7 +112,7 @@ fn architecture(activation: ActivationChoice, structure: Structure) -> Architect
 
 fn network(architecture: Architecture, seed: u64) -> NetworkLagrangian<f64> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let weights = initial_weights(&architecture, Initialization::VariancePreserving, &mut random);
+    let weights = architecture.initial_weights(Initialization::VariancePreserving, &mut random);
     NetworkLagrangian::new(architecture, weights).unwrap()
 }
 
@@ -150,9 +148,9 @@ const DEFINITE: Signature = Signature { positive: 2, negative: 0 };
 
 #[test]
 fn the_double_pendulum_is_certified_everywhere() {
-    let configured = crate::lagrangian::configure::<f64>("double-pendulum", &[]).unwrap();
+    let configured = crate::lagrangian::SystemInstance::<f64>::named("double-pendulum", &[]).unwrap();
     let region = Bounds::uniform(2, (-3.2, 3.2), (-9.0, 9.0));
-    let found = certify_system(&configured, &region, &limited(DEFINITE, 20_000)).unwrap();
+    let found = Certificate::of_system(&configured, &region, &limited(DEFINITE, 20_000)).unwrap();
     assert_eq!((found.certified, found.refuted, found.open, found.witness.clone()), (1.0, 0.0, 0.0, None));
     // M = [[2, c], [c, 1]], c = cos(theta1 - theta2): the largest condition number is at c = 1, (3 + sqrt 5) / (3 - sqrt 5) = 6.854.
     let largest = (3.0 + 5f64.sqrt()) / (3.0 - 5f64.sqrt());
@@ -162,7 +160,7 @@ fn the_double_pendulum_is_certified_everywhere() {
     assert_eq!(found.verdict(&[0.1], &[1.0]), Verdict::Open);
     let bounded = |condition| {
         let options = CertificateOptions { condition: Some(condition), ..limited(DEFINITE, 20_000) };
-        certify_system(&configured, &region, &options).unwrap()
+        Certificate::of_system(&configured, &region, &options).unwrap()
     };
     let within = bounded(6.9);
     assert_eq!(within.certified, 1.0);
@@ -181,7 +179,7 @@ fn a_change_of_sign_is_found_where_it_is() {
     // M = diag(x, 1) is definite for x > 0, two thirds of the region.
     let lagrangian = formula("x*x_dot^2/2 + y_dot^2/2 + sin(y)*x");
     let region = Bounds { positions: vec![(-1.0, 2.0), (-1.0, 1.0)], velocities: vec![(-1.0, 1.0); 2] };
-    let found = certify::<_, f64>(&lagrangian, &[], &region, &limited(DEFINITE, 60)).unwrap();
+    let found = Certificate::of::<_, f64>(&lagrangian, &[], &region, &limited(DEFINITE, 60)).unwrap();
     assert!(found.open < 1e-4 && found.open > 0.0, "{found:?}");
     assert!((found.certified - 2.0 / 3.0).abs() <= found.open && (found.refuted - 1.0 / 3.0).abs() <= found.open);
     let witness = found.witness.as_ref().unwrap();
@@ -190,18 +188,18 @@ fn a_change_of_sign_is_found_where_it_is() {
     assert!(matches!(found.verdict(&[0.5, 0.0], &[0.0, 0.0]), Verdict::Certified { .. }));
     // The other way round.
     let indefinite = Signature { positive: 1, negative: 1 };
-    let turned = certify::<_, f64>(&lagrangian, &[], &region, &limited(indefinite, 60)).unwrap();
+    let turned = Certificate::of::<_, f64>(&lagrangian, &[], &region, &limited(indefinite, 60)).unwrap();
     assert_eq!((turned.certified, turned.refuted), (found.refuted, found.certified));
     // A singular matrix everywhere: nothing is proven.
     let singular = formula("(x_dot + y_dot)^2/2");
-    let nothing = certify::<_, f64>(&singular, &[], &region, &limited(DEFINITE, 60)).unwrap();
+    let nothing = Certificate::of::<_, f64>(&singular, &[], &region, &limited(DEFINITE, 60)).unwrap();
     assert_eq!((nothing.open, nothing.witness), (1.0, None));
 }
 
 #[test]
 fn what_is_not_decided_stays_open() {
     let region = Bounds { positions: vec![(-1.0, 1.0); 2], velocities: vec![(-1.0, 1.0); 2] };
-    let open = |text: &str| certify::<_, f64>(&formula(text), &[], &region, &limited(DEFINITE, 400)).unwrap();
+    let open = |text: &str| Certificate::of::<_, f64>(&formula(text), &[], &region, &limited(DEFINITE, 400)).unwrap();
     // Kinks of L: |x_dot| has no second derivative at 0, whatever it is elsewhere.
     let kink = open("x_dot^2 + y_dot^2 + abs(x_dot)");
     assert!(kink.certified > 0.9 && kink.open > 0.0 && kink.refuted == 0.0, "{kink:?}");
@@ -221,7 +219,7 @@ fn what_is_not_decided_stays_open() {
             if q[0].primal() >= zero { v[0] * v[0] + v[1] * v[1] } else { v[0] * v[1] }
         }
     }
-    let read = certify::<_, f64>(&Reader, &[], &region, &limited(DEFINITE, 100)).unwrap();
+    let read = Certificate::of::<_, f64>(&Reader, &[], &region, &limited(DEFINITE, 100)).unwrap();
     assert_eq!(read.open, 1.0);
 }
 
@@ -231,7 +229,7 @@ fn no_certified_box_of_a_network_holds_a_violation() {
     shape.alpha = 0.15;
     let model = network(shape, 17);
     let region = Bounds { positions: vec![(0.5, 2.0), (-1.0, 0.0)], velocities: vec![(-1.0, 0.5), (-0.5, 1.0)] };
-    let found = certify_network(&model, &region, &limited(DEFINITE, 40_000)).unwrap();
+    let found = Certificate::of_network(&model, &region, &limited(DEFINITE, 40_000)).unwrap();
     assert!(found.certified > 0.05 && found.refuted > 0.05, "{found:?}");
     assert!((found.certified + found.refuted + found.open - 1.0).abs() < 1e-12);
     let mut random = ChaCha8Rng::seed_from_u64(5);
@@ -298,7 +296,7 @@ fn a_raised_flag_ends_a_search_with_what_it_has() {
     let region = Bounds::uniform(2, (0.0, 6.2), (-2.0, 2.0));
     let stop = AtomicBool::new(true);
     let options = CertificateOptions { stop: Some(&stop), threads: 2, ..limited(DEFINITE, usize::MAX) };
-    let found = certify_network(&model, &region, &options).unwrap();
+    let found = Certificate::of_network(&model, &region, &options).unwrap();
     assert!(found.boxes <= 2 && found.open > 0.0, "{found:?}");
     assert!((found.certified + found.refuted + found.open - 1.0).abs() < 1e-12);
 }
@@ -315,17 +313,17 @@ fn structures_are_certified_by_construction() {
     ] {
         let shape = Architecture { time_like, ..architecture(ActivationChoice::Softplus, structure) };
         let model = network(shape, 18);
-        let found = certify_network(&model, &region, &limited(signature, 100)).unwrap();
+        let found = Certificate::of_network(&model, &region, &limited(signature, 100)).unwrap();
         assert_eq!((found.certified, found.open, found.boxes, found.by_construction), (1.0, 0.0, 0, true));
         assert!(matches!(found.verdict(&[1.0, 0.0], &[0.0, 0.0]), Verdict::Certified { .. }));
         // A condition number has to be enclosed.
         let options = CertificateOptions { condition: Some(1e4), ..limited(signature, 4000) };
-        let bounded = certify_network(&model, &region, &options).unwrap();
+        let bounded = Certificate::of_network(&model, &region, &options).unwrap();
         assert!(bounded.by_construction && bounded.boxes > 0 && bounded.certified > 0.9, "{bounded:?}");
         assert!(bounded.condition.unwrap() <= 1e4);
         // A known part may spoil the signature, and another signature is not that of the structure.
         let other = if signature == DEFINITE { indefinite } else { DEFINITE };
-        let wrong = certify_network(&model, &region, &limited(other, 400)).unwrap();
+        let wrong = Certificate::of_network(&model, &region, &limited(other, 400)).unwrap();
         assert!(!wrong.by_construction && wrong.certified == 0.0 && wrong.refuted > 0.0);
     }
 }
@@ -337,7 +335,7 @@ fn threads_and_turns_change_nothing() {
     let model = network(shape, 19);
     let certified = |positions: (f64, f64), threads: usize| {
         let region = Bounds { positions: vec![positions, (-0.2, 0.2)], velocities: vec![(-0.2, 0.2); 2] };
-        certify_network(&model, &region, &CertificateOptions { threads, ..limited(DEFINITE, 3000) }).unwrap()
+        Certificate::of_network(&model, &region, &CertificateOptions { threads, ..limited(DEFINITE, 3000) }).unwrap()
     };
     // No more threads are started than there are boxes.
     let many = certified((1.0, 2.0), usize::MAX);
@@ -365,7 +363,7 @@ fn what_does_not_fit_is_refused() {
     let lagrangian = formula("x_dot^2 + y_dot^2");
     let region = Bounds::uniform(2, (-1.0, 1.0), (-1.0, 1.0));
     let error = |region: &Bounds, options: CertificateOptions| {
-        certify::<_, f64>(&lagrangian, &[], region, &options).unwrap_err()
+        Certificate::of::<_, f64>(&lagrangian, &[], region, &options).unwrap_err()
     };
     let options = CertificateOptions::new(DEFINITE);
     let short = Bounds { velocities: vec![(0.0, 1.0)], ..region.clone() };
@@ -384,5 +382,5 @@ fn what_does_not_fit_is_refused() {
     }
     // A point is a region.
     let point = Bounds::uniform(2, (0.5, 0.5), (0.0, 0.0));
-    assert_eq!(certify::<_, f64>(&lagrangian, &[], &point, &options).unwrap().certified, 1.0);
+    assert_eq!(Certificate::of::<_, f64>(&lagrangian, &[], &point, &options).unwrap().certified, 1.0);
 }

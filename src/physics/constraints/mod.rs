@@ -158,52 +158,53 @@ pub enum ConstraintSearchError {
     },
 }
 
-/// Finds the constraints of recorded motion.
-///
-/// # Errors
-/// [`ConstraintSearchError`] for too many terms or too few samples.
-pub fn find_constraints(
-    samples: &MotionSamples,
-    search: ConstraintSearch,
-) -> Result<FoundConstraints, ConstraintSearchError> {
-    let (of_positions, of_velocities, mut cut_short) = searched_terms(samples, search)?;
-    let mut held = RowsTaken::at(samples, GRADIENT_STATES);
-    let stop = &samples.cancellation;
-    stop.stage("functions that vanish");
-    let limits = Limits::of(samples);
-    let vanishing = Vanishing::of(samples, &of_positions, None, false, (1.0, limits));
-    let (candidates, all_forms) = vanishing.generators();
-    if !all_forms {
-        cut_short.push("the search for formulas with few terms was stopped early: simpler ones may exist".to_string());
+impl FoundConstraints {
+    /// Finds the constraints of recorded motion.
+    ///
+    /// # Errors
+    /// [`ConstraintSearchError`] for too many terms or too few samples.
+    pub fn of(samples: &MotionSamples, search: ConstraintSearch) -> Result<FoundConstraints, ConstraintSearchError> {
+        let (of_positions, of_velocities, mut cut_short) = searched_terms(samples, search)?;
+        let mut held = RowsTaken::at(samples, GRADIENT_STATES);
+        let stop = &samples.cancellation;
+        stop.stage("functions that vanish");
+        let limits = Limits::of(samples);
+        let vanishing = Vanishing::of(samples, &of_positions, None, false, (1.0, limits));
+        let (candidates, all_forms) = vanishing.generators();
+        if !all_forms {
+            cut_short
+                .push("the search for formulas with few terms was stopped early: simpler ones may exist".to_string());
+        }
+        stop.check()?;
+        let functions = held.take(samples, &of_positions, candidates.clone(), false, NEW_FUNCTION);
+        let gap = vanishing.gap(&functions);
+        let functions = independent_everywhere(samples, &of_positions, functions, candidates);
+        stop.check()?;
+        let mut constraints = described_functions(samples, &of_positions, limits, functions);
+        stop.stage("functions that are constant");
+        if samples.trajectories() > 1 {
+            let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, (1.0, limits));
+            let conserved = held.take(samples, &of_positions, constant.generators().0, false, FURTHER_CANDIDATE);
+            constraints
+                .extend(conserved.iter().map(|found| found.described(&of_positions, ConstraintKind::PerTrajectory)));
+        }
+        stop.check()?;
+        stop.stage("rows of velocities");
+        constraints.extend(velocity_rows(samples, &of_velocities, (&vanishing, limits), &mut held));
+        stop.check()?;
+        let count = constraints.iter().filter(|found| found.kind.is_imposed()).count();
+        Ok(FoundConstraints {
+            count,
+            constraints,
+            gap,
+            trajectories: samples.trajectories(),
+            refuted: held.refuted,
+            coordinates: samples.names().to_vec(),
+            noise: samples.relative_noise(),
+            still: samples.still(),
+            limits: cut_short,
+        })
     }
-    stop.check()?;
-    let functions = held.take(samples, &of_positions, candidates.clone(), false, NEW_FUNCTION);
-    let gap = vanishing.gap(&functions);
-    let functions = independent_everywhere(samples, &of_positions, functions, candidates);
-    stop.check()?;
-    let mut constraints = described_functions(samples, &of_positions, limits, functions);
-    stop.stage("functions that are constant");
-    if samples.trajectories() > 1 {
-        let constant = Vanishing::of(samples, &of_positions, Some(&vanishing), true, (1.0, limits));
-        let conserved = held.take(samples, &of_positions, constant.generators().0, false, FURTHER_CANDIDATE);
-        constraints.extend(conserved.iter().map(|found| found.described(&of_positions, ConstraintKind::PerTrajectory)));
-    }
-    stop.check()?;
-    stop.stage("rows of velocities");
-    constraints.extend(velocity_rows(samples, &of_velocities, (&vanishing, limits), &mut held));
-    stop.check()?;
-    let count = constraints.iter().filter(|found| found.kind.is_imposed()).count();
-    Ok(FoundConstraints {
-        count,
-        constraints,
-        gap,
-        trajectories: samples.trajectories(),
-        refuted: held.refuted,
-        coordinates: samples.names().to_vec(),
-        noise: samples.relative_noise(),
-        still: samples.still(),
-        limits: cut_short,
-    })
 }
 
 /// The terms of functions of the coordinates and of rows linear in the velocities, and what the search leaves out, in words.

@@ -43,7 +43,7 @@ fn recorded(
 
 fn found(recording: &Recording) -> FoundConstraints {
     let samples = MotionSamples::of(recording, &SmoothOptions::default()).unwrap();
-    find_constraints(&samples, ConstraintSearch::default()).unwrap()
+    FoundConstraints::of(&samples, ConstraintSearch::default()).unwrap()
 }
 
 /// Two rods of lengths 1 and 0.8: one turns at a constant rate, the other accelerates.
@@ -69,7 +69,7 @@ fn rods_are_found_at_any_noise_with_their_lengths() {
         // Higher degrees only add products of these functions.
         let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
         let further =
-            find_constraints(&samples, ConstraintSearch { degree: 4, ..ConstraintSearch::default() }).unwrap();
+            FoundConstraints::of(&samples, ConstraintSearch { degree: 4, ..ConstraintSearch::default() }).unwrap();
         assert_eq!(further.formulas(), found.formulas(), "{noise}");
         let first = &found.constraints[0];
         assert_eq!(first.coefficients.keys().collect::<Vec<_>>(), ["1", "x1^2", "y1^2"], "{noise}: {first:?}");
@@ -260,11 +260,11 @@ fn nothing_is_found_where_nothing_is() {
 fn too_few_samples_and_too_many_terms_are_refused() {
     let mut recording = recorded(&["x1", "y1", "x2", "y2"], &[false; 4], 0.0, false, &mut |rng| two_rods(rng));
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
-    let search = |degree| find_constraints(&samples, ConstraintSearch { degree, velocity_degree: 1 });
+    let search = |degree| FoundConstraints::of(&samples, ConstraintSearch { degree, velocity_degree: 1 });
     assert!(matches!(search(12), Err(ConstraintSearchError::Terms { .. })));
     recording.tracks.truncate(1);
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
-    let few = find_constraints(&samples, ConstraintSearch { degree: 4, velocity_degree: 1 });
+    let few = FoundConstraints::of(&samples, ConstraintSearch { degree: 4, velocity_degree: 1 });
     assert!(matches!(few, Err(ConstraintSearchError::Samples { terms: 70, .. })), "{few:?}");
 }
 
@@ -348,7 +348,7 @@ fn a_curve_that_crosses_itself_on_the_way_is_no_constraint_to_compute_with() {
     // x^4 = x^2 - y^2
     let recording = recorded(&["x", "y"], &[false; 2], 1e-4, false, &mut motion);
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).unwrap();
-    let found = find_constraints(&samples, ConstraintSearch { degree: 4, velocity_degree: 0 }).unwrap();
+    let found = FoundConstraints::of(&samples, ConstraintSearch { degree: 4, velocity_degree: 0 }).unwrap();
     assert_eq!((found.count, found.formulas().len()), (0, 0), "{found:?}");
     assert!(found.constraints.iter().any(|c| c.kind == ConstraintKind::Branching), "{found:?}");
 }

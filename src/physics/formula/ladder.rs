@@ -14,49 +14,51 @@ use crate::names::rounded;
 use crate::recording::Recording;
 use std::collections::BTreeSet;
 
-/// Finds a formula for the Lagrangian of recorded motion. If no families are given, searches larger and larger libraries until one fits the
-/// held-out motion; if none does, it also searches, as far as the options allow, for friction that depends on the position and for a
-/// periodic drive.
-///
-/// # Errors
-/// [`FormulaError`] for motion that is too short, cannot be smoothed or does not determine a law, for example because a coordinate stands still;
-/// for a library that is too large, and for invalid functions and terms. Motion that the library cannot fit is not an error: the verdict reports
-/// it.
-pub fn formula_of_motion(recording: &Recording, options: &FormulaOptions) -> Result<FoundFormula, FormulaError> {
-    let rungs = options.families.map_or_else(|| rungs(&recording.periodic), |families| vec![families]);
-    let friction = if options.friction { Friction::Constant } else { Friction::None };
-    let first = Extent { families: rungs[0], gyroscopic: options.gyroscopic, friction, drive: None };
-    Library::new(&recording.coordinates, &recording.periodic, first, &options.functions)?;
-    let stop = &options.cancellation;
-    stop.stage("smoothed motion");
-    let data = Prepared::new(recording, options)?;
-    stop.check()?;
-    let held = constrained(recording, options.noise.as_ref(), stop)?;
-    stop.check()?;
-    let validation = held_out(&data, options.seed);
-    let mut ladder = Ladder::new(&data, &validation, options, rungs);
-    ladder.climb(friction)?;
-    if options.friction && options.friction_of_position && !ladder.is_done() {
-        ladder.climb(Friction::OfPosition)?;
-    }
-    if options.drive && !ladder.is_done() {
-        ladder.drive()?;
-    }
-    let Ladder { searched, best, refused, notes, .. } = ladder;
-    let mut found = best.ok_or_else(|| refused.unwrap_or(FormulaError::Singular))?;
-    found.tried = searched;
-    found.notes.extend(notes);
-    found.notes.extend(data.suspicious.iter().cloned());
-    if let Some(formula) = held {
-        found.notes.push(format!(
+impl FoundFormula {
+    /// Finds a formula for the Lagrangian of recorded motion. If no families are given, searches larger and larger libraries until one fits the
+    /// held-out motion; if none does, it also searches, as far as the options allow, for friction that depends on the position and for a
+    /// periodic drive.
+    ///
+    /// # Errors
+    /// [`FormulaError`] for motion that is too short, cannot be smoothed or does not determine a law, for example because a coordinate stands still;
+    /// for a library that is too large, and for invalid functions and terms. Motion that the library cannot fit is not an error: the verdict reports
+    /// it.
+    pub fn of_motion(recording: &Recording, options: &FormulaOptions) -> Result<FoundFormula, FormulaError> {
+        let rungs = options.families.map_or_else(|| rungs(&recording.periodic), |families| vec![families]);
+        let friction = if options.friction { Friction::Constant } else { Friction::None };
+        let first = Extent { families: rungs[0], gyroscopic: options.gyroscopic, friction, drive: None };
+        Library::new(&recording.coordinates, &recording.periodic, first, &options.functions)?;
+        let stop = &options.cancellation;
+        stop.stage("smoothed motion");
+        let data = Prepared::new(recording, options)?;
+        stop.check()?;
+        let held = constrained(recording, options.noise.as_ref(), stop)?;
+        stop.check()?;
+        let validation = held_out(&data, options.seed);
+        let mut ladder = Ladder::new(&data, &validation, options, rungs);
+        ladder.climb(friction)?;
+        if options.friction && options.friction_of_position && !ladder.is_done() {
+            ladder.climb(Friction::OfPosition)?;
+        }
+        if options.drive && !ladder.is_done() {
+            ladder.drive()?;
+        }
+        let Ladder { searched, best, refused, notes, .. } = ladder;
+        let mut found = best.ok_or_else(|| refused.unwrap_or(FormulaError::Singular))?;
+        found.tried = searched;
+        found.notes.extend(notes);
+        found.notes.extend(data.suspicious.iter().cloned());
+        if let Some(formula) = held {
+            found.notes.push(format!(
             "the only trajectory satisfies {formula} = 0, by a constraint or by chance: terms that vanish with it are not determined, record more trajectories"
         ));
-        found.several = true;
+            found.several = true;
+        }
+        found.rescale(options.scale.as_ref())?;
+        found.name_constants();
+        stop.check()?;
+        Ok(found)
     }
-    found.rescale(options.scale.as_ref())?;
-    found.name_constants();
-    stop.check()?;
-    Ok(found)
 }
 
 /// A search through libraries.

@@ -2,13 +2,13 @@
 //!
 //! The Euler-Lagrange equations are linear in the coefficients of a library of terms: products of velocities with functions of the coordinates.
 //! Terms that are total derivatives, or that follow from others by identities such as `sin^2 + cos^2 = 1`, are removed by the rank
-//! of the stacked equations at random states. For recorded motion, [`formula_of_motion`] uses the weak form of the equations along smoothed
+//! of the stacked equations at random states. For recorded motion, [`FoundFormula::of_motion`] uses the weak form of the equations along smoothed
 //! positions, removes terms one after the other with refits, and then fits the surviving terms to the motion itself: multiple shooting with
 //! Gauss and Newton's method, in which every term of the library is tried again, and which noise in the positions does not bias. Held-out
-//! trajectories show whether the residuals are noise. For models, [`formula_of_model`] uses the equations at sampled states.
+//! trajectories show whether the residuals are noise. For models, [`FoundFormula::of_model`] uses the equations at sampled states.
 //!
 //! ```
-//! use lnn::formula::{FormulaOptions, Verdict, formula_of_motion};
+//! use lnn::formula::{FormulaOptions, FoundFormula, Verdict};
 //! use lnn::prelude::*;
 //! use lnn::recording::{RecordedTrajectory, Recording};
 //!
@@ -20,7 +20,7 @@
 //!     RecordedTrajectory { name: format!("{k}"), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] }
 //! });
 //! let recording = Recording { coordinates: vec!["a".into()], periodic: vec![true], tracks: tracks.collect() };
-//! let found = formula_of_motion(&recording, &FormulaOptions::default())?;
+//! let found = FoundFormula::of_motion(&recording, &FormulaOptions::default())?;
 //! assert_eq!(found.verdict, Verdict::Found);
 //! let terms: Vec<&str> = found.terms.iter().map(|t| t.term.as_str()).collect();
 //! assert_eq!(terms, ["a_dot^2", "cos(a)"]);
@@ -60,8 +60,6 @@ pub use error::FormulaError;
 pub use families::Families;
 pub use find::FormulaOptions;
 pub use found::{FoundDrive, FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
-pub use ladder::formula_of_motion;
-pub use regress::formula_of_model;
 // For the packages of this repository.
 #[doc(hidden)]
 pub use thresholds::{MODEL_STATES, MOST_BOOTSTRAPS};

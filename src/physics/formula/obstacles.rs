@@ -3,7 +3,7 @@
 use super::error::FormulaError;
 use super::thresholds::{RANGE_SAMPLES, WILD_DEVIATION};
 use crate::cancellation::Cancellation;
-use crate::constraints::{ConstraintKind, ConstraintSearch, MotionSamples, find_constraints};
+use crate::constraints::{ConstraintKind, ConstraintSearch, FoundConstraints, MotionSamples};
 use crate::names::pluralize;
 use crate::recording::Recording;
 use crate::recording::smooth::{SmoothOptions, Smoothing};
@@ -82,7 +82,7 @@ pub(super) fn constrained(
     let options = SmoothOptions { noise: noise.cloned(), ..SmoothOptions::default() };
     let samples = MotionSamples::of(recording, &options)?.watched(cancellation);
     // A search for constraints that is not possible does not prevent one for a formula.
-    let Ok(found) = find_constraints(&samples, ConstraintSearch::default()) else { return Ok(None) };
+    let Ok(found) = FoundConstraints::of(&samples, ConstraintSearch::default()) else { return Ok(None) };
     let held = found.constraints.into_iter().filter(|c| c.kind == ConstraintKind::Holonomic).map(|c| c.formula);
     let formulas: Vec<String> = held.collect();
     if recording.tracks.len() == 1 {

@@ -27,54 +27,56 @@ struct ModelState {
     acceleration: Vec<f64>,
 }
 
-/// Finds a formula for a model by its equations of motion at states `(states, n)`: terms by `M (a - a(q, v))` at random accelerations `a`, or by
-/// `a(q, v)` alone if no formula has the mass matrix `M`; coefficients by `a(q, v)`.
-///
-/// Structured models, black boxes and systems are evaluated in the same way. Total derivatives do not change the equations, so neither the
-/// model nor the formula needs a gauge.
-///
-/// # Errors
-/// [`FormulaError`] for a model whose terms are not finite, for a library that is too large, and for invalid functions and terms.
-pub fn formula_of_model(
-    model: &dyn EulerLagrange<f64>,
-    (names, periodic): (&[String], &[bool]),
-    (q, v): (&[f64], &[f64]),
-    options: &FormulaOptions,
-) -> Result<FoundFormula, FormulaError> {
-    let families = options.families.unwrap_or_default();
-    let friction = if options.friction { Friction::Constant } else { Friction::None };
-    let extent = Extent { families, gyroscopic: options.gyroscopic, friction, drive: None };
-    let library = Library::new(names, periodic, extent, &options.functions)?;
-    let n = library.n();
-    let stop = &options.cancellation;
-    stop.stage("states of the model");
-    let rows: Vec<(&[f64], &[f64])> = q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_MODEL_STATES).collect();
-    let states = evaluated(model, &rows, stop)?;
-    let scales = Scales::of(&states, n);
-    let (kept, quotient) = library.independent(&scales.bounds, options.seed);
-    let found = choose(&library, &kept, (&states, &scales), options)?;
-    let ModelChoice { windows, path, choice } =
-        found.ok_or_else(|| FormulaError::NotFinite { failed: rows.len() - states.len(), states: rows.len() })?;
-    let covariance = covariance(&windows, &choice, &scales.sigma);
-    let of = Model {
-        terms: choice.set.iter().map(|&k| kept[k]).collect(),
-        coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
-        frequency: 0.0,
-    };
-    let residual = residual(&choice, n);
-    let probability = probabilities(&windows, &choice, &path, &scales.sigma, options);
-    let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability), options);
-    found.verdict = if residual <= MOST_MODEL_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
-    found.residual = residual;
-    found.noise = scales.sigma;
-    found.of_model = true;
-    found.searched = (library.searched, quotient.removed);
-    (found.basis, found.tried) = (families.to_string(), vec![families.to_string()]);
-    (found.bounds, found.speeds) = (scales.bounds, scales.speeds);
-    found.rescale(options.scale.as_ref())?;
-    found.name_constants();
-    stop.check()?;
-    Ok(found)
+impl FoundFormula {
+    /// Finds a formula for a model by its equations of motion at states `(states, n)`: terms by `M (a - a(q, v))` at random accelerations `a`, or by
+    /// `a(q, v)` alone if no formula has the mass matrix `M`; coefficients by `a(q, v)`.
+    ///
+    /// Structured models, black boxes and systems are evaluated in the same way. Total derivatives do not change the equations, so neither the
+    /// model nor the formula needs a gauge.
+    ///
+    /// # Errors
+    /// [`FormulaError`] for a model whose terms are not finite, for a library that is too large, and for invalid functions and terms.
+    pub fn of_model(
+        model: &dyn EulerLagrange<f64>,
+        (names, periodic): (&[String], &[bool]),
+        (q, v): (&[f64], &[f64]),
+        options: &FormulaOptions,
+    ) -> Result<FoundFormula, FormulaError> {
+        let families = options.families.unwrap_or_default();
+        let friction = if options.friction { Friction::Constant } else { Friction::None };
+        let extent = Extent { families, gyroscopic: options.gyroscopic, friction, drive: None };
+        let library = Library::new(names, periodic, extent, &options.functions)?;
+        let n = library.n();
+        let stop = &options.cancellation;
+        stop.stage("states of the model");
+        let rows: Vec<(&[f64], &[f64])> = q.chunks_exact(n).zip(v.chunks_exact(n)).take(MOST_MODEL_STATES).collect();
+        let states = evaluated(model, &rows, stop)?;
+        let scales = Scales::of(&states, n);
+        let (kept, quotient) = library.independent(&scales.bounds, options.seed);
+        let found = choose(&library, &kept, (&states, &scales), options)?;
+        let ModelChoice { windows, path, choice } =
+            found.ok_or_else(|| FormulaError::NotFinite { failed: rows.len() - states.len(), states: rows.len() })?;
+        let covariance = covariance(&windows, &choice, &scales.sigma);
+        let of = Model {
+            terms: choice.set.iter().map(|&k| kept[k]).collect(),
+            coefficients: choice.set.iter().map(|&k| choice.coefficients[k]).collect(),
+            frequency: 0.0,
+        };
+        let residual = residual(&choice, n);
+        let probability = probabilities(&windows, &choice, &path, &scales.sigma, options);
+        let mut found = FoundFormula::new(&library, periodic, &of, (&covariance, &probability), options);
+        found.verdict = if residual <= MOST_MODEL_RESIDUAL { Verdict::Found } else { Verdict::NotInLibrary };
+        found.residual = residual;
+        found.noise = scales.sigma;
+        found.of_model = true;
+        found.searched = (library.searched, quotient.removed);
+        (found.basis, found.tried) = (families.to_string(), vec![families.to_string()]);
+        (found.bounds, found.speeds) = (scales.bounds, scales.speeds);
+        found.rescale(options.scale.as_ref())?;
+        found.name_constants();
+        stop.check()?;
+        Ok(found)
+    }
 }
 
 /// The states at which a model is finite, which must be at least half of them.
@@ -312,16 +314,20 @@ fn probabilities(windows: &Windows, choice: &Choice, path: &Path, sigma: &[f64],
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::build;
+    use crate::lagrangian::SystemInstance;
 
     #[test]
     fn a_system_is_found_again() {
-        let model = build::<f64>("double-pendulum", &[("m2".to_string(), "0.5".to_string())]).unwrap();
+        let model = SystemInstance::<f64>::named("double-pendulum", &[("m2".to_string(), "0.5".to_string())])
+            .unwrap()
+            .build()
+            .unwrap();
         let names = ["theta1", "theta2"].map(String::from);
         let mut rng = RngStream::Region.generator(3);
         let mut draw = |size: f64| (0..400).map(|_| size * (rng.random::<f64>() - 0.5)).collect::<Vec<f64>>();
         let (q, v) = (draw(6.0), draw(8.0));
-        let found = formula_of_model(&*model, (&names, &[true, true]), (&q, &v), &FormulaOptions::default()).unwrap();
+        let found =
+            FoundFormula::of_model(&*model, (&names, &[true, true]), (&q, &v), &FormulaOptions::default()).unwrap();
         assert_eq!(found.verdict, Verdict::Found);
         let texts: Vec<&str> = found.terms.iter().map(|t| t.term.as_str()).collect();
         assert_eq!(
@@ -343,7 +349,7 @@ mod tests {
 
     #[test]
     fn equal_constants_have_one_name_and_a_unit() {
-        let model = build::<f64>("kepler", &[]).unwrap();
+        let model = SystemInstance::<f64>::named("kepler", &[]).unwrap().build().unwrap();
         let names = ["x", "y"].map(String::from);
         let mut rng = RngStream::Region.generator(4);
         let mut draw =
@@ -351,7 +357,7 @@ mod tests {
         let (q, v) = (draw(0.5, 2.0), draw(-1.0, 1.0));
         let families = Some("polynomial:1,radial:2".parse().unwrap());
         let options = FormulaOptions { families, units: vec!["m".to_string(); 2], ..FormulaOptions::default() };
-        let found = formula_of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
+        let found = FoundFormula::of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
         let seen: Vec<(&str, &str, Option<&str>)> =
             found.terms.iter().map(|t| (t.term.as_str(), t.constant.as_str(), t.unit.as_deref())).collect();
         let kinetic = [("x_dot^2", "c1", Some("1")), ("y_dot^2", "c1", Some("1"))];
@@ -360,7 +366,7 @@ mod tests {
         assert!(file.contains("c1*x_dot^2 + c1*y_dot^2") && !file.contains("c3"), "{file}");
         // Constants with different units are never the same.
         let options = FormulaOptions { units: ["m", "A"].map(String::from).to_vec(), ..options };
-        let found = formula_of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
+        let found = FoundFormula::of_model(&*model, (&names, &[false; 2]), (&q, &v), &options).unwrap();
         assert_eq!([0, 1, 2].map(|k| found.terms[k].constant.as_str()), ["c1", "c2", "c3"]);
         // The distance of different lengths has no unit.
         assert_eq!(found.terms[2].unit, None);

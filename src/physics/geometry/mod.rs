@@ -17,11 +17,11 @@
 //! `R_abcd R^abcd = 24`. Tensors are flat, row-major in the order of their indices: `R^a_bcd` stands at `[a][b][c][d]`.
 //!
 //! ```
-//! use lnn::geometry::geometries;
-//! use lnn::lagrangian::build;
+//! use lnn::geometry::Geometry;
+//! use lnn::lagrangian::SystemInstance;
 //!
-//! let space = build::<f64>("ads4-geodesic", &[])?; // coordinates t, x, y, z
-//! let point = geometries(&*space, &[0.0, 0.3, -0.2, 1.5], &[0.0; 4])?.remove(0)?;
+//! let space = SystemInstance::<f64>::named("ads4-geodesic", &[])?.build()?; // coordinates t, x, y, z
+//! let point = Geometry::of(&*space, &[0.0, 0.3, -0.2, 1.5], &[0.0; 4])?.remove(0)?;
 //! assert_eq!((point.metric.signature.negative, point.metric.signature.positive), (1, 3));
 //! assert!((point.curvature.scalar + 12.0).abs() < 1e-13);
 //! assert!((point.curvature.kretschmann - 24.0).abs() < 1e-13);
@@ -36,7 +36,7 @@ mod surfaces;
 mod tensors;
 
 pub use orbits::{CircularOrbit, Equator, Sense, Symmetric, Turn, TurningPoint};
-pub use surfaces::{Change, Character, Surface, surfaces};
+pub use surfaces::{Change, Character, Surface};
 pub use tensors::{Connection, Curvature, Metric};
 
 // For the packages of this repository.
@@ -112,29 +112,31 @@ impl<S: Scalar> Geometry<S> {
     }
 }
 
-/// The geometry of a model at points `(batch, n)` in physical units, each with its own failure.
-///
-/// `velocity`, `(n)`, is the one at which the mass matrix is taken: zeros unless `L` is more than quadratic in the velocities.
-/// Lagrangians that are written down are computed in double-double numbers and rounded at the end; networks in their own numbers.
-///
-/// # Errors
-/// [`GeometryError::Shape`]; [`GeometryError::TooMany`] for more than 32 coordinates; what [`EulerLagrange::metric_jets`] refuses.
-#[allow(clippy::type_complexity)]
-pub fn geometries<S: Scalar>(
-    model: &dyn EulerLagrange<S>,
-    points: &[S],
-    velocity: &[S],
-) -> Result<Vec<Result<Geometry<S>, GeometryError>>, GeometryError> {
-    let n = model.coordinates();
-    if n > MOST_COORDINATES {
-        return Err(GeometryError::TooMany { found: n, most: MOST_COORDINATES });
+impl<S: Scalar> Geometry<S> {
+    /// The geometry of a model at points `(batch, n)` in physical units, each with its own failure.
+    ///
+    /// `velocity`, `(n)`, is the one at which the mass matrix is taken: zeros unless `L` is more than quadratic in the velocities.
+    /// Lagrangians that are written down are computed in double-double numbers and rounded at the end; networks in their own numbers.
+    ///
+    /// # Errors
+    /// [`GeometryError::Shape`]; [`GeometryError::TooMany`] for more than 32 coordinates; what [`EulerLagrange::metric_jets`] refuses.
+    #[allow(clippy::type_complexity)]
+    pub fn of(
+        model: &dyn EulerLagrange<S>,
+        points: &[S],
+        velocity: &[S],
+    ) -> Result<Vec<Result<Geometry<S>, GeometryError>>, GeometryError> {
+        let n = model.coordinates();
+        if n > MOST_COORDINATES {
+            return Err(GeometryError::TooMany { found: n, most: MOST_COORDINATES });
+        }
+        expect_length("velocity", n, velocity.len())?;
+        let velocities = velocity.repeat(points.len() / n.max(1));
+        if let Some(jets) = model.wide_metric_jets(points, &velocities)? {
+            return Ok(jets.iter().map(|jet| Geometry::new(jet)?.rounded()).collect());
+        }
+        Ok(model.metric_jets(points, &velocities)?.iter().map(Geometry::new).collect())
     }
-    expect_length("velocity", n, velocity.len())?;
-    let velocities = velocity.repeat(points.len() / n.max(1));
-    if let Some(jets) = model.wide_metric_jets(points, &velocities)? {
-        return Ok(jets.iter().map(|jet| Geometry::new(jet)?.rounded()).collect());
-    }
-    Ok(model.metric_jets(points, &velocities)?.iter().map(Geometry::new).collect())
 }
 
 /// Reason why the geometry is undefined at a point.

@@ -304,7 +304,7 @@ impl<S: Scalar> Equator<'_, S> {
 mod tests {
     use super::*;
     use crate::geometry::Turn;
-    use crate::lagrangian::build;
+    use crate::lagrangian::SystemInstance;
     use std::f64::consts::FRAC_PI_2;
 
     const ORIGIN: [f64; 4] = [0.0, 0.0, FRAC_PI_2, 0.0];
@@ -315,7 +315,7 @@ mod tests {
 
     #[test]
     fn turning_points_of_schwarzschild_have_the_closed_form() {
-        let hole = build::<f64>("schwarzschild-geodesic", &[]).unwrap();
+        let hole = SystemInstance::<f64>::named("schwarzschild-geodesic", &[]).unwrap().build().unwrap();
         let equator = equator(&*hole);
         for (p, e) in [(7.5, 0.3), (10.0, 0.1), (40.0, 0.6)] {
             let (near, far) = (p / (1.0 + e), p / (1.0 - e));
@@ -335,7 +335,10 @@ mod tests {
 
     #[test]
     fn both_turning_points_of_kerr_have_the_same_constants() {
-        let hole = build::<f64>("kerr-geodesic", &[("a".to_string(), "0.9".to_string())]).unwrap();
+        let hole = SystemInstance::<f64>::named("kerr-geodesic", &[("a".to_string(), "0.9".to_string())])
+            .unwrap()
+            .build()
+            .unwrap();
         let equator = equator(&*hole);
         for sense in [Sense::Forward, Sense::Backward] {
             let [near, far] = [(10.0, 25.0), (25.0, 10.0)].map(|(a, b)| equator.between(a, b, sense).unwrap().unwrap());

@@ -1,6 +1,6 @@
 //! The geometry at a point by the names of the coordinates: a table for people, LaTeX for papers, and every number for files.
 
-use super::{Geometry, GeometryError, geometries};
+use super::{Geometry, GeometryError};
 use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
 use crate::linalg::{Inertia, inertia};
@@ -87,17 +87,17 @@ pub fn depends_on_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: 
     first.iter().zip(second).any(|(&a, &b)| (a - b).abs().to_f64() > tolerance)
 }
 
-/// The reports of points, `(points, n)`, as [`geometries`] finds them; a point without geometry has at most its metric.
+/// The reports of points, `(points, n)`, as [`Geometry::of`] finds them; a point without geometry has at most its metric.
 ///
 /// # Errors
-/// Those of [`geometries`].
+/// Those of [`Geometry::of`].
 pub fn point_reports<'a, S: Scalar>(
     model: &dyn EulerLagrange<S>,
     names: &'a [String],
     points: &[S],
     velocity: &[S],
 ) -> Result<Vec<PointReport<'a, S>>, GeometryError> {
-    let found = geometries(model, points, velocity)?;
+    let found = Geometry::of(model, points, velocity)?;
     let points = points.chunks_exact(names.len());
     Ok(found.into_iter().zip(points).map(|(found, q)| PointReport::new(names, found, model, q, velocity)).collect())
 }
@@ -291,10 +291,11 @@ fn quantities<S: Scalar>(metric: &[S], found: Option<&Geometry<S>>) -> Vec<Quant
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::build;
+    use crate::lagrangian::SystemInstance;
 
     fn report(name: &str, names: [&str; 4], q: [f64; 4]) -> [String; 2] {
-        let (model, names) = (build::<f64>(name, &[]).unwrap(), names.map(String::from));
+        let (model, names) =
+            (SystemInstance::<f64>::named(name, &[]).unwrap().build().unwrap(), names.map(String::from));
         let report = point_reports(&*model, &names, &q, &[0.0; 4]).unwrap().remove(0);
         [report.findings("here").to_string(), report.latex("here")]
     }

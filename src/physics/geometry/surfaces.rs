@@ -91,42 +91,44 @@ fn changes<S: Scalar>(low: S, high: S) -> bool {
     high == zero || (low < zero && high > zero) || (low > zero && high < zero)
 }
 
-/// Where the determinant of a block of the metric changes its sign on the straight line of coordinates from `from` to `to`, both
-/// `(n)`, at a velocity `(n)`.
-///
-/// | block | surface |
-/// |---|---|
-/// | the time | ergosurface, where `g_tt = 0` (of a static metric also its horizon) |
-/// | time and the angle of a symmetry axis | horizon of a rotating black hole: no observer can stay at its place |
-/// | all coordinates but one | where the surfaces on which that one is constant become null: a horizon in coordinates that are regular there |
-/// | all coordinates | the signature changes |
-///
-/// The line is cut into `steps` equal pieces; every piece whose ends differ in sign is halved until its ends are neighbours. Two surfaces
-/// within a piece, and determinants that touch zero, are not seen. Points where the metric is not finite are skipped.
-///
-/// # Errors
-/// [`GeometryError::Shape`] for slices of the wrong length, or a block that is empty or names a coordinate that does not exist; the model's
-/// own.
-pub fn surfaces<S: Scalar>(
-    model: &dyn EulerLagrange<S>,
-    block: &[usize],
-    (from, to): (&[S], &[S]),
-    velocity: &[S],
-    steps: usize,
-) -> Result<Vec<Surface<S>>, GeometryError> {
-    let n = model.coordinates();
-    for (what, end) in [("start of the line", from), ("end of the line", to)] {
-        super::expect_length(what, n, end.len())?;
+impl<S: Scalar> Surface<S> {
+    /// Where the determinant of a block of the metric changes its sign on the straight line of coordinates from `from` to `to`, both
+    /// `(n)`, at a velocity `(n)`.
+    ///
+    /// | block | surface |
+    /// |---|---|
+    /// | the time | ergosurface, where `g_tt = 0` (of a static metric also its horizon) |
+    /// | time and the angle of a symmetry axis | horizon of a rotating black hole: no observer can stay at its place |
+    /// | all coordinates but one | where the surfaces on which that one is constant become null: a horizon in coordinates that are regular there |
+    /// | all coordinates | the signature changes |
+    ///
+    /// The line is cut into `steps` equal pieces; every piece whose ends differ in sign is halved until its ends are neighbours. Two surfaces
+    /// within a piece, and determinants that touch zero, are not seen. Points where the metric is not finite are skipped.
+    ///
+    /// # Errors
+    /// [`GeometryError::Shape`] for slices of the wrong length, or a block that is empty or names a coordinate that does not exist; the model's
+    /// own.
+    pub fn find(
+        model: &dyn EulerLagrange<S>,
+        block: &[usize],
+        (from, to): (&[S], &[S]),
+        velocity: &[S],
+        steps: usize,
+    ) -> Result<Vec<Surface<S>>, GeometryError> {
+        let n = model.coordinates();
+        for (what, end) in [("start of the line", from), ("end of the line", to)] {
+            super::expect_length(what, n, end.len())?;
+        }
+        if let Some(found) = block.iter().copied().find(|&i| i >= n).or(block.is_empty().then_some(0)) {
+            return Err(GeometryError::Shape { what: "block of the metric", expected: n, found });
+        }
+        let line = Line { model, block, from, to, velocity };
+        let mut found = Vec::new();
+        for piece in line.sign_changes(steps.max(1))? {
+            found.extend(line.surface(piece)?);
+        }
+        Ok(found)
     }
-    if let Some(found) = block.iter().copied().find(|&i| i >= n).or(block.is_empty().then_some(0)) {
-        return Err(GeometryError::Shape { what: "block of the metric", expected: n, found });
-    }
-    let line = Line { model, block, from, to, velocity };
-    let mut found = Vec::new();
-    for piece in line.sign_changes(steps.max(1))? {
-        found.extend(line.surface(piece)?);
-    }
-    Ok(found)
 }
 
 /// A straight line of coordinates along which the determinant of a block of the metric is examined. Places on it are numbers from 0 to 1.

@@ -3,7 +3,7 @@
 use super::follow::Follower;
 use super::tests::{described, noise};
 use super::*;
-use crate::lagrangian::{Equations, EulerLagrange, RowEquations, SystemInstance, configure, project};
+use crate::lagrangian::{Equations, EulerLagrange, RowEquations, SystemInstance, project};
 use crate::recording::{RecordedTrajectory, Recording, Targets};
 use crate::rollout::{Driven, RolloutOptions};
 
@@ -337,7 +337,7 @@ impl Recorded {
 
 #[test]
 fn slopes_and_starts_under_constraints_are_those_of_differences() {
-    let rolling = configure::<f64>("rolling-disk", &[]).unwrap();
+    let rolling = SystemInstance::<f64>::named("rolling-disk", &[]).unwrap();
     let starts: [&[f64]; 2] = [SLIDER.starts[1], &[0.3, -0.2, 0.7, 0.4, 0.1, 0.2, 1.1, 2.0]];
     for (instance, start) in [SLIDER.form(SLIDER.truth), rolling].into_iter().zip(starts) {
         let recorded = Recorded::of(instance, start);

@@ -227,7 +227,7 @@ impl Problem<'_> {
 mod tests {
     use super::*;
     use crate::identification::Between;
-    use crate::lagrangian::{Description, Equations, configure_system};
+    use crate::lagrangian::{Description, Equations};
     use crate::recording::RecordedTrajectory;
     use std::borrow::Cow;
 
@@ -242,7 +242,7 @@ mod tests {
     /// Readings at the last of a few samples, and their slopes by initial state and parameters 3, 0, 1.
     fn readings_at_end(start: &[f64], change: (usize, f64)) -> (Vec<f64>, Vec<f64>) {
         let description: Description = serde_json::from_str(FORM).unwrap();
-        let mut instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        let mut instance = SystemInstance::<f64>::new(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         instance.parameters[change.0] += change.1;
         let chosen = [3, 0, 1];
         let equations = Equations::record(&instance, &chosen, &[]).unwrap().unwrap();

@@ -10,16 +10,16 @@
 //!
 //! ```
 //! use lnn::identification::{IdentifyOptions, identify};
-//! use lnn::lagrangian::configure;
+//! use lnn::lagrangian::SystemInstance;
 //! use lnn::prelude::*;
 //! use lnn::recording::{RecordedTrajectory, Recording};
 //!
 //! // A pendulum of 0.7 m, from positions alone.
-//! let truth = configure::<f64>("n-pendulum", &[("n".into(), "1".into()), ("l".into(), "0.7".into())])?.build()?;
+//! let truth = SystemInstance::<f64>::named("n-pendulum", &[("n".into(), "1".into()), ("l".into(), "0.7".into())])?.build()?;
 //! let motion = truth.rollout(&[1.0], &[0.0], 6.0, 0.02)?;
 //! let track = RecordedTrajectory { name: "swing".into(), times: motion.t, q: motion.q, v: vec![], a: vec![], force: vec![] };
 //! let recording = Recording { coordinates: vec!["theta".into()], periodic: vec![true], tracks: vec![track] };
-//! let form = configure::<f64>("n-pendulum", &[("n".into(), "1".into())])?;
+//! let form = SystemInstance::<f64>::named("n-pendulum", &[("n".into(), "1".into())])?;
 //! let found = identify(&form, &recording, &IdentifyOptions::new().constants(["l"]))?;
 //! assert!((found.constants[0].value - 0.7).abs() < 1e-6);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

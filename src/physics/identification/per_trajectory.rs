@@ -2,7 +2,7 @@
 
 use super::thresholds::MOST_OWN_CONSTANTS;
 use super::{IdentifyError, IdentifyOptions};
-use crate::lagrangian::{PerTrajectory, SystemInstance, configure_system};
+use crate::lagrangian::{PerTrajectory, SystemInstance};
 use crate::recording::{RecordedTrajectory, Recording};
 use std::borrow::Cow;
 use std::path::Path;
@@ -48,7 +48,7 @@ pub(super) fn per_trajectory(
     let inputs = recording.tracks.iter().enumerate().map(rows).collect();
     let each = |symbol: &String| unknown.get(symbol).cloned().unwrap_or_else(|| vec![symbol.clone()]);
     let constants = options.constants.iter().flat_map(each).collect();
-    let instance = configure_system::<f64>(Cow::Owned(all.system()?), &[])?;
+    let instance = SystemInstance::<f64>::new(Cow::Owned(all.system()?), &[])?;
     Ok(Some((instance, IdentifyOptions { constants, inputs, ..options.clone() })))
 }
 

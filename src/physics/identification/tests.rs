@@ -1,7 +1,7 @@
 //! Tests on simulated motion, whose true constants are known.
 
 use super::*;
-use crate::lagrangian::{Description, SystemInstance, configure, configure_system};
+use crate::lagrangian::{Description, SystemInstance};
 use crate::random::RngStream;
 use crate::recording::{RecordedTrajectory, Recording};
 use crate::rollout::{Driven, Motion, RolloutOptions, SampledForce};
@@ -50,7 +50,7 @@ pub(super) fn noise(recording: &mut Recording, sigma: &[f64], seed: u64) {
 
 pub(super) fn described(text: &str, pairs: &Pairs<'_>) -> SystemInstance<f64> {
     let description: Description = serde_json::from_str(text).unwrap();
-    configure_system(Cow::Owned(description.system().unwrap()), &given(pairs)).unwrap()
+    SystemInstance::new(Cow::Owned(description.system().unwrap()), &given(pairs)).unwrap()
 }
 
 const STARTS: [&[f64]; 4] =
@@ -59,8 +59,8 @@ const STARTS: [&[f64]; 4] =
 #[test]
 fn constants_of_a_double_pendulum_lie_within_their_errors() {
     let truth = [("m2", 0.6), ("l1", 0.8), ("l2", 1.3)];
-    let instance = configure::<f64>("double-pendulum", &given(&truth)).unwrap();
-    let form = configure::<f64>("double-pendulum", &[]).unwrap();
+    let instance = SystemInstance::<f64>::named("double-pendulum", &given(&truth)).unwrap();
+    let form = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap();
     let options = IdentifyOptions::new().constants(["m2", "l1", "l2"]);
     let mut squares = Vec::new();
     for seed in 0..4 {
@@ -91,8 +91,8 @@ fn constants_of_a_double_pendulum_lie_within_their_errors() {
 #[test]
 fn readings_may_be_missing() {
     let truth = [("m2", 0.6), ("l1", 0.8), ("l2", 1.3)];
-    let instance = configure::<f64>("double-pendulum", &given(&truth)).unwrap();
-    let form = configure::<f64>("double-pendulum", &[]).unwrap();
+    let instance = SystemInstance::<f64>::named("double-pendulum", &given(&truth)).unwrap();
+    let form = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap();
     let constants = || ["m2", "l1", "l2"].map(String::from).to_vec();
     let (mut squares, mut explained) = (Vec::new(), 0);
     for seed in 0..4 {
@@ -239,11 +239,11 @@ fn a_wrong_model_is_not_explained() {
 
 #[test]
 fn outliers_are_named_and_a_robust_fit_is_not_moved() {
-    let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
+    let instance = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
     let mut recording = recorded(&instance, &[&[1.0, 0.0]], (6.0, 0.02), &[1e-3], 4);
     let wrong = [37, 120, 200];
     wrong.iter().for_each(|&at| recording.tracks[0].q[at] += 0.1);
-    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let form = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0)])).unwrap();
     let options = IdentifyOptions::new().constants(["l"]).robust(true);
     let found = identify(&form, &recording, &options).unwrap();
     let mut samples: Vec<usize> = found.outliers.iter().map(|o| o.sample).collect();
@@ -258,14 +258,14 @@ fn outliers_are_named_and_a_robust_fit_is_not_moved() {
 
 #[test]
 fn sensors_have_constants_too() {
-    let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
+    let instance = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
     let mut recording = recorded(&instance, &[&[2.0, 0.0], &[1.0, 3.0]], (6.0, 0.02), &[0.0], 5);
     let mut rng = RngStream::Trajectories.generator(6);
     for q in recording.tracks.iter_mut().flat_map(|track| &mut track.q) {
         let draw: f64 = StandardNormal.sample(&mut rng);
         *q = 1.05 * *q + 0.03 + 1e-3 * draw;
     }
-    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let form = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0)])).unwrap();
     let theta = || vec![recording.coordinates[0].clone()];
     let options = IdentifyOptions::new().constants(["l"]).offsets(theta()).gains(theta());
     let found = identify(&form, &recording, &options).unwrap();
@@ -321,7 +321,7 @@ fn a_driven_oscillator_is_known_from_coarse_samples_and_the_hold_is_seen() {
 
 #[test]
 fn what_does_not_fit_together_is_refused() {
-    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let form = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0)])).unwrap();
     let recording = recorded(&form, &[&[1.0, 0.0]], (1.0, 0.02), &[1e-3], 8);
     let refused = |options: IdentifyOptions| identify(&form, &recording, &options).unwrap_err();
     let names = |name: &str| vec![name.to_string()];
@@ -334,10 +334,10 @@ fn what_does_not_fit_together_is_refused() {
     assert!(matches!(refused(IdentifyOptions::new().segment(f64::NAN)), IdentifyError::Option { what: "segment", .. }));
     let short = recorded(&form, &[&[1.0, 0.0]], (0.1, 0.02), &[1e-3], 8);
     assert!(matches!(identify(&form, &short, &Default::default()), Err(IdentifyError::Short { found: 6, .. })));
-    let double = configure::<f64>("double-pendulum", &[]).unwrap();
+    let double = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap();
     let error = identify(&double, &recording, &Default::default()).unwrap_err();
     assert_eq!(error, IdentifyError::Coordinates { expected: 2, found: 1 });
-    let constrained = configure::<f64>("particle-on-ellipse", &[]).unwrap();
+    let constrained = SystemInstance::<f64>::named("particle-on-ellipse", &[]).unwrap();
     let plane = Recording {
         coordinates: vec!["x".into(), "y".into()],
         periodic: vec![false; 2],
@@ -432,8 +432,8 @@ fn noise_of_a_known_force_is_seen_in_the_motion() {
 
 #[test]
 fn errors_under_correlated_noise_are_those_of_the_scatter() {
-    let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
-    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let instance = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
+    let form = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0)])).unwrap();
     let options = IdentifyOptions::new().constants(["l"]);
     let of = |memory: f64, seed: u64| {
         let mut recording = recorded(&instance, &[&[1.0, 0.0]], (12.0, 0.02), &[0.0], seed);
@@ -459,8 +459,8 @@ fn errors_under_correlated_noise_are_those_of_the_scatter() {
 
 #[test]
 fn a_verdict_says_why() {
-    let instance = configure::<f64>("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
-    let form = configure::<f64>("n-pendulum", &given(&[("n", 1.0)])).unwrap();
+    let instance = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0), ("l", 0.7)])).unwrap();
+    let form = SystemInstance::<f64>::named("n-pendulum", &given(&[("n", 1.0)])).unwrap();
     let options = IdentifyOptions::new().constants(["l"]);
     let verdict = |noise: f64, spoil: &dyn Fn(&mut f64, f64)| {
         let mut recording = recorded(&instance, &[&[1.0, 0.0], &[0.5, 1.0]], (6.0, 0.02), &[noise], 3);

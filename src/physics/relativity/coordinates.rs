@@ -344,7 +344,7 @@ pub fn depends_on_time(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{Lagrangian, Mechanics, build};
+    use crate::lagrangian::{Lagrangian, Mechanics, SystemInstance};
     use crate::scalar::Real;
 
     #[test]
@@ -362,7 +362,7 @@ mod tests {
     /// In flat space the pulled-back terms are those of the oblate spheroidal metric; in Kerr space they are the derivatives of `L`.
     #[test]
     fn pulled_back_terms_are_derivatives_of_the_lagrangian() {
-        let hole = build::<f64>("kerr-cartesian", &[]).unwrap();
+        let hole = SystemInstance::<f64>::named("kerr-cartesian", &[]).unwrap().build().unwrap();
         let model = Spheroidal { model: &*hole, spin: 0.9, time: 0, space: [1, 2, 3] };
         let (q, v) = ([0.3, 4.0, 1.1, 0.7], [1.2, 0.3, -0.1, 0.05]);
         let of = |q: &[f64], v: &[f64], request: Request| {
@@ -417,7 +417,9 @@ mod tests {
     #[test]
     fn a_time_that_nothing_moves_is_alone() {
         let chart = Chart::default();
-        let of = |name: &str| time_moves_alone(&*build::<f64>(name, &[]).unwrap(), chart, 20.0);
+        let of = |name: &str| {
+            time_moves_alone(&*SystemInstance::<f64>::named(name, &[]).unwrap().build().unwrap(), chart, 20.0)
+        };
         assert!(!of("schwarzschild-cartesian"));
         assert!(time_moves_alone(&Mechanics::<_, f64>::new(Ultrastatic, vec![]), chart, 20.0));
     }
@@ -445,7 +447,7 @@ mod tests {
         let shrinking = Mechanics::<_, f64>::new(Shrinking, vec![]);
         assert_eq!(depends_on_time(&shrinking, 0, &points, 7.0), Ok(true));
         // It may depend on the position.
-        let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+        let hole = SystemInstance::<f64>::named("schwarzschild-cartesian", &[]).unwrap().build().unwrap();
         let points = [0.0, 8.0, 0.0, 0.0, 0.0, 0.0, -3.0, 1.0, 0.0, 0.0, 0.0, 0.0];
         assert_eq!(depends_on_time(&*hole, 0, &points, 100.0), Ok(false));
         assert_eq!(depends_on_time(&*hole, 1, &points, 1.0), Ok(true));

@@ -5,19 +5,19 @@
 //!
 //! A [`Camera`] stands at a point of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
 //! followed backwards in time, by the accelerations of the model alone, until it reaches a great distance, where its direction gives a
-//! point of the sky, or piles up at a horizon, in which case the pixel belongs to the shadow. [`shadow()`] does so for a picture,
-//! [`outline`] finds the edge of the shadow by bisection, with the impact parameters of its rays, and [`Sky`] gives the colours.
+//! point of the sky, or piles up at a horizon, in which case the pixel belongs to the shadow. [`Shadow::of()`] does so for a picture,
+//! [`Outline::of`] finds the edge of the shadow by bisection, with the impact parameters of its rays, and [`Sky`] gives the colours.
 //!
 //! ```
-//! use lnn::lagrangian::build;
-//! use lnn::relativity::{Camera, Sky, Tracing, outline, shadow};
+//! use lnn::lagrangian::SystemInstance;
+//! use lnn::relativity::{Camera, Outline, Shadow, Sky, Tracing};
 //!
-//! let hole = build::<f64>("schwarzschild-cartesian", &[])?;
+//! let hole = SystemInstance::<f64>::named("schwarzschild-cartesian", &[])?.build()?;
 //! let camera = Camera { width: 24, height: 24, ..Camera::new(20.0, 1.4) };
-//! let seen = shadow(&*hole, &camera, &Tracing::of(&camera), &|_| ())?;
+//! let seen = Shadow::of(&*hole, &camera, &Tracing::of(&camera), &|_| ())?;
 //! let image = Sky::around(&camera).image(&seen);
 //! assert_eq!((image.pixels.len(), image.pixels[12 * 24 + 12]), (24 * 24, [0, 0, 0]));
-//! let edge = outline(&*hole, &camera, &Tracing::of(&camera), 8)?.unwrap();
+//! let edge = Outline::of(&*hole, &camera, &Tracing::of(&camera), 8)?.unwrap();
 //! assert!((edge.right().celestial[0] - 27f64.sqrt()).abs() < 1e-5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -39,8 +39,8 @@ pub use coordinates::{CentralCoordinates, Chart};
 pub use rays::{Ray, RayOutcome, Tracing};
 #[cfg(feature = "training")]
 pub use readings::{LearnedHole, Reading};
-pub use says::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary, picture, views};
-pub use shadow::{Edge, Outline, Shadow, outline, shadow};
+pub use says::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary};
+pub use shadow::{Edge, Outline, Shadow};
 pub use sky::{Image, Sky};
 pub use two_sided::TwoSided;
 

@@ -321,7 +321,7 @@ pub fn infall(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::build;
+    use crate::lagrangian::SystemInstance;
     use crate::relativity::Chart;
     use std::f64::consts::PI;
 
@@ -341,7 +341,7 @@ mod tests {
     fn a_hole_has_all_three_and_they_do_what_they_are_called() {
         let around = CentralCoordinates::Cartesian(Chart::default());
         for name in ["schwarzschild-cartesian", "kerr-cartesian"] {
-            let hole = build::<f64>(name, &[]).unwrap();
+            let hole = SystemInstance::<f64>::named(name, &[]).unwrap().build().unwrap();
             let found = orbits(&*hole, around, 1.0, 1.5).unwrap();
             assert_eq!(
                 found.iter().map(|o| o.title).collect::<Vec<_>>(),
@@ -381,7 +381,7 @@ mod tests {
             ("schwarzschild-geodesic", CentralCoordinates::Spherical { time: 0, radius: 1, polar: 2, azimuth: 3 }),
         ];
         for (name, around) in around {
-            let hole = build::<f64>(name, &[]).unwrap();
+            let hole = SystemInstance::<f64>::named(name, &[]).unwrap().build().unwrap();
             let origin = around.origin();
             for (p, e) in [(8.0, 0.5), (20.0, 0.2), (50.0, 0.5)] {
                 let (near, far) = (p / (1.0 + e), p / (1.0 - e));
@@ -403,7 +403,7 @@ mod tests {
     #[test]
     fn what_falls_in_has_no_period() {
         let around = CentralCoordinates::Cartesian(Chart::default());
-        let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+        let hole = SystemInstance::<f64>::named("schwarzschild-cartesian", &[]).unwrap().build().unwrap();
         let (q, v) = ([0.0, 6.0, 0.0, 0.0], [1.3, 0.0, 0.1, 0.0]);
         assert_eq!(radial_period(&*hole, (&q, &v), around, (400.0, 0.5)), None);
     }
@@ -411,7 +411,7 @@ mod tests {
     #[test]
     fn a_fall_from_rest_is_a_cycloid_through_the_horizon() {
         let around = CentralCoordinates::Cartesian(Chart::default());
-        let hole = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+        let hole = SystemInstance::<f64>::named("schwarzschild-cartesian", &[]).unwrap().build().unwrap();
         let (start, end) = (10.0_f64, 1.5);
         let q = around.place(start, [0.48, 0.6, 0.64]);
         let v = [(1.0 - 2.0 / start).sqrt().recip(), 0.0, 0.0, 0.0];

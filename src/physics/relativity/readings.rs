@@ -10,11 +10,11 @@ use super::thresholds::{
     VACUUM,
 };
 use super::{CentralCoordinates, Chart};
-use crate::analysis::{conserved_change, mass_matrix_error, matrices_at_rest, nearest_factor};
-use crate::geometry::{CircularOrbit, GeometryError, Sense, geometries};
-use crate::lagrangian::{EulerLagrange, SystemInstance, configure_values};
+use crate::analysis::{MassMatrixError, conserved_change, matrices_at_rest, nearest_factor};
+use crate::geometry::{CircularOrbit, Geometry, GeometryError, Sense};
+use crate::lagrangian::{EulerLagrange, SystemInstance};
 use crate::linalg::{Workspace, solve};
-use crate::symmetry::{self, Basis, Degrees, EXACT, Region, quadratic, symmetries};
+use crate::symmetry::{self, Basis, Degrees, Quadratic, Region, Symmetries};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -104,7 +104,7 @@ impl LearnedHole<'_> {
     /// The error of the metric, and the factor that brings the learned one closest.
     fn metric(&self, mass: f64, all: &mut Vec<Reading>) -> f64 {
         let points = self.around.points(METRIC_POINTS, self.within(mass, (1.5, 20.0)));
-        let found = mass_matrix_error(self.exact, self.learned, &points);
+        let found = MassMatrixError::of(self.exact, self.learned, &points);
         let error = Some(found.error).filter(|error| error.failed == 0);
         all.push(Self::error("metric, R from 1.5 to 20 M, median", error.map(|error| error.median), METRIC_TARGETS[0]));
         all.push(Self::error("metric, R from 1.5 to 20 M, 99 %", error.map(|error| error.p99), METRIC_TARGETS[1]));
@@ -235,7 +235,7 @@ impl LearnedHole<'_> {
         for distance in [3.0, 6.0, 10.0] {
             let points = self.around.points(12, (distance * mass, distance * mass));
             let rest = [0.0; 4];
-            let of = |model| geometries(model, &points, &rest)?.into_iter().collect::<Result<Vec<_>, _>>();
+            let of = |model| Geometry::of(model, &points, &rest)?.into_iter().collect::<Result<Vec<_>, _>>();
             let (exact, learned) = (of(self.exact)?, of(self.learned).ok());
             let largest = |errors: &mut dyn Iterator<Item = f64>| errors.fold(0.0, f64::max);
             let vacuum =
@@ -281,11 +281,11 @@ impl LearnedHole<'_> {
         let (q, v) = region.states(1000, 0, |_, _| true);
         let count = |model, tolerance| {
             let model = Spheroidal { model, spin, time, space };
-            let found = symmetries(&model, &basis, (&q, &v), tolerance).ok()?;
-            let found = quadratic(&model, &basis, &found.fields, (&q, &v), tolerance).ok()?;
+            let found = Symmetries::find(&model, &basis, (&q, &v), tolerance).ok()?;
+            let found = Quadratic::find(&model, &basis, &found.fields, (&q, &v), tolerance).ok()?;
             found.separation.count.map(|_| found.conserved.len() as f64)
         };
-        let (exact, learned) = (count(self.exact, Some(EXACT)), count(self.learned, None));
+        let (exact, learned) = (count(self.exact, Some(Symmetries::EXACT)), count(self.learned, None));
         all.extend(Self::reading("quadratic charges beyond products: Carter's", exact, learned, 0.0));
     }
 
@@ -311,10 +311,10 @@ impl LearnedHole<'_> {
         let (_, mut v) = region.states(points.len() / 4, 0, |_, _| true);
         v.chunks_exact_mut(4).for_each(|v| v[self.around.time()] += 1.5);
         let count = |model, tolerance| {
-            let found = symmetries(model, &basis, (&points, &v), tolerance).ok()?;
+            let found = Symmetries::find(model, &basis, (&points, &v), tolerance).ok()?;
             Some(found.separation.count? as f64)
         };
-        let (exact, learned) = (count(self.exact, Some(EXACT)), count(self.learned, None));
+        let (exact, learned) = (count(self.exact, Some(Symmetries::EXACT)), count(self.learned, None));
         all.extend(Self::reading("point symmetries", exact, learned, 0.0));
         self.carter(mass, all);
     }
@@ -326,7 +326,7 @@ type Values = BTreeMap<String, f64>;
 /// Residuals of the metric of a system with these parameters against a learned one, each point relative to the size of its metric, after
 /// the best factor; `None` if no such system exists.
 fn residuals(system: &SystemInstance<f64>, values: &Values, learned: &[f64], points: &[f64]) -> Option<Vec<f64>> {
-    let model = configure_values::<f64>(system.system.clone(), values).ok()?.build().ok()?;
+    let model = SystemInstance::<f64>::with_values(system.system.clone(), values).ok()?.build().ok()?;
     let n = model.coordinates();
     let exact = matrices_at_rest(model.as_ref(), points);
     let factor = nearest_factor(n * n, &exact, learned);
@@ -414,12 +414,11 @@ fn conserved_drift(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{build, configure};
     use crate::relativity::{CentralCoordinates, Chart};
 
     fn of(name: &str, given: &[(&str, &str)], around: CentralCoordinates, range: (f64, f64)) -> Vec<Reading> {
         let given: Vec<_> = given.iter().map(|(symbol, value)| (symbol.to_string(), value.to_string())).collect();
-        let system = configure::<f64>(name, &given).unwrap();
+        let system = SystemInstance::<f64>::named(name, &given).unwrap();
         let exact = system.build().unwrap();
         let pair = LearnedHole { exact: &*exact, learned: &*exact, system: &system, around, range };
         pair.readings().unwrap()
@@ -454,8 +453,10 @@ mod tests {
     fn mass_and_spin_are_found_from_far_off() {
         let around = CentralCoordinates::Cartesian(Chart::default());
         let given = [("M".to_string(), "1.3".to_string()), ("a".to_string(), "-0.7".to_string())];
-        let (hole, system) =
-            (build::<f64>("kerr-cartesian", &given).unwrap(), configure("kerr-cartesian", &[]).unwrap());
+        let (hole, system) = (
+            SystemInstance::<f64>::named("kerr-cartesian", &given).unwrap().build().unwrap(),
+            SystemInstance::named("kerr-cartesian", &[]).unwrap(),
+        );
         let start = [("M".to_string(), 0.8), ("a".to_string(), 0.2)].into();
         let points = around.points(200, (2.0, 20.0));
         let found = nearest_parameters(&system, &*hole, &points, &start).unwrap();

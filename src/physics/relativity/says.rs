@@ -1,6 +1,6 @@
 //! Views through metrics, and their report.
 
-use super::{Camera, Image, Outline, RelativityError, Shadow, Tracing, difference_image, outline, shadow};
+use super::{Camera, Image, Outline, RelativityError, Shadow, Tracing, difference_image};
 use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, Interruptible};
 use crate::names::{percentage, pluralize, rounded};
@@ -26,51 +26,55 @@ pub struct View {
 /// A metric with its name, `exact` or `learned`.
 pub type NamedMetric<'a> = (&'static str, &'a dyn EulerLagrange<f64>);
 
-/// Renders metrics with a camera, one after the other, until a flag is raised, and finds the edges of the shadows in a number of
-/// directions, if requested.
-///
-/// `begin` receives the name of a metric before its rays are followed, `advance` the number of pixels of every finished block.
-///
-/// # Errors
-/// [`RelativityError`].
-pub fn views(
-    metrics: &[NamedMetric<'_>],
-    (camera, tracing, edges): (&Camera, &Tracing, usize),
-    stop: &AtomicBool,
-    begin: &dyn Fn(&str),
-    advance: &(dyn Fn(usize) + Sync),
-) -> Result<Vec<View>, RelativityError> {
-    let mut views = Vec::new();
-    for (name, model) in metrics {
-        if stop.load(Ordering::Relaxed) {
-            break;
+impl View {
+    /// Renders metrics with a camera, one after the other, until a flag is raised, and finds the edges of the shadows in a number of
+    /// directions, if requested.
+    ///
+    /// `begin` receives the name of a metric before its rays are followed, `advance` the number of pixels of every finished block.
+    ///
+    /// # Errors
+    /// [`RelativityError`].
+    pub fn of(
+        metrics: &[NamedMetric<'_>],
+        (camera, tracing, edges): (&Camera, &Tracing, usize),
+        stop: &AtomicBool,
+        begin: &dyn Fn(&str),
+        advance: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<View>, RelativityError> {
+        let mut views = Vec::new();
+        for (name, model) in metrics {
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
+            begin(name);
+            let began = Instant::now();
+            let model = Interruptible::new(*model, stop);
+            let shadow = Shadow::of(&model, camera, tracing, advance)?;
+            let seconds = began.elapsed().as_secs_f64();
+            let edge = if edges == 0 { Ok(None) } else { Outline::of(&model, camera, tracing, edges) };
+            // An edge between rays that were not followed does not count.
+            let outline = if stop.load(Ordering::Relaxed) { None } else { edge? };
+            views.push(View { name, shadow, outline, seconds });
         }
-        begin(name);
-        let began = Instant::now();
-        let model = Interruptible::new(*model, stop);
-        let shadow = shadow(&model, camera, tracing, advance)?;
-        let seconds = began.elapsed().as_secs_f64();
-        let edge = if edges == 0 { Ok(None) } else { outline(&model, camera, tracing, edges) };
-        // An edge between rays that were not followed does not count.
-        let outline = if stop.load(Ordering::Relaxed) { None } else { edge? };
-        views.push(View { name, shadow, outline, seconds });
+        Ok(views)
     }
-    Ok(views)
 }
 
 /// White columns between pictures.
 const GAP: usize = 8;
 
-/// The pictures of views of one camera side by side; two views also get a picture of their difference.
-///
-/// # Errors
-/// Views of different sizes.
-pub fn picture(camera: &Camera, views: &[View]) -> Result<Image, RelativityError> {
-    let mut images = images(camera, views);
-    if let [exact, learned] = views {
-        images.push(difference_image(&exact.shadow, &learned.shadow)?);
+impl Camera {
+    /// The pictures of views of one camera side by side; two views also get a picture of their difference.
+    ///
+    /// # Errors
+    /// Views of different sizes.
+    pub fn picture(&self, views: &[View]) -> Result<Image, RelativityError> {
+        let mut images = images(self, views);
+        if let [exact, learned] = views {
+            images.push(difference_image(&exact.shadow, &learned.shadow)?);
+        }
+        Ok(Image::beside(&images, GAP))
     }
-    Ok(Image::beside(&images, GAP))
 }
 
 fn images(camera: &Camera, views: &[View]) -> Vec<Image> {

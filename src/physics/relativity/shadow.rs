@@ -30,26 +30,28 @@ pub struct Difference {
     pub most: f64,
 }
 
-/// Follows the ray of the middle of every pixel of a camera.
-///
-/// `progress` receives the number of pixels of every finished block, from any thread. Pixels that the model had not reached when it was
-/// interrupted are unfinished. The result does not depend on the number of threads.
-///
-/// # Errors
-/// [`RelativityError`].
-pub fn shadow(
-    model: &dyn EulerLagrange<f64>,
-    camera: &Camera,
-    tracing: &Tracing,
-    progress: &(dyn Fn(usize) + Sync),
-) -> Result<Shadow, RelativityError> {
-    let tetrad = Tetrad::new(model, camera)?;
-    let Camera { chart, width, height, .. } = *camera;
-    let start = |pixel: usize| {
-        let middle = camera.direction((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
-        (tetrad.event, tetrad.ray(middle))
-    };
-    Ok(Shadow { width, height, rays: trace_each(model, &chart, width * height, &start, tracing, progress)? })
+impl Shadow {
+    /// Follows the ray of the middle of every pixel of a camera.
+    ///
+    /// `progress` receives the number of pixels of every finished block, from any thread. Pixels that the model had not reached when it was
+    /// interrupted are unfinished. The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// [`RelativityError`].
+    pub fn of(
+        model: &dyn EulerLagrange<f64>,
+        camera: &Camera,
+        tracing: &Tracing,
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Shadow, RelativityError> {
+        let tetrad = Tetrad::new(model, camera)?;
+        let Camera { chart, width, height, .. } = *camera;
+        let start = |pixel: usize| {
+            let middle = camera.direction((pixel % width) as f64 + 0.5, (pixel / width) as f64 + 0.5);
+            (tetrad.event, tetrad.ray(middle))
+        };
+        Ok(Shadow { width, height, rays: trace_each(model, &chart, width * height, &start, tracing, progress)? })
+    }
 }
 
 /// A place on one of the two skies, if there is one.
@@ -175,50 +177,52 @@ impl Outline {
     }
 }
 
-/// Finds the edge of the shadow, or of the second region, in directions around the centre of the picture, to `pi/2^30` of an angle and the
-/// error of rays a hundred times as accurate as those of a picture; `None` if the ray of the centre is not captured.
-///
-/// The shadow is assumed to end once along every direction. `directions` is rounded up to a multiple of four.
-///
-/// # Errors
-/// [`RelativityError`].
-pub fn outline(
-    model: &dyn EulerLagrange<f64>,
-    camera: &Camera,
-    tracing: &Tracing,
-    directions: usize,
-) -> Result<Option<Outline>, RelativityError> {
-    expect(directions > 0, "directions", "at least 1", directions as f64)?;
-    let tetrad = Tetrad::new(model, camera)?;
-    let count = directions.next_multiple_of(4);
-    let tracing = Tracing { tolerance: (EDGE_TOLERANCE * tracing.tolerance).max(TOLERANCES.0), ..*tracing };
-    let toward = |k: usize, angle: f64| {
-        let ((sin, cos), (up, right)) = (angle.sin_cos(), (TAU * k as f64 / count as f64).sin_cos());
-        tetrad.ray([sin * right, sin * up, cos])
-    };
-    let captured = |tangents: Vec<[f64; 4]>| -> Result<Vec<bool>, RelativityError> {
-        let starts: Vec<_> = tangents.into_iter().map(|k| (tetrad.event, k)).collect();
-        let rays = trace(model, &camera.chart, &starts, &tracing, &|_| ())?;
-        Ok(rays.iter().map(|ray| !matches!(ray.fate, RayOutcome::Escaped(_))).collect())
-    };
-    if captured(vec![toward(0, 0.0)])? != [true] {
-        return Ok(None);
-    }
-    let mut brackets = vec![(0.0, PI); count];
-    for _ in 0..EDGE_HALVINGS {
-        let middles: Vec<f64> = brackets.iter().map(|(low, high)| 0.5 * (low + high)).collect();
-        let inside = captured(middles.iter().enumerate().map(|(k, &angle)| toward(k, angle)).collect())?;
-        for ((bracket, middle), inside) in brackets.iter_mut().zip(middles).zip(inside) {
-            *(if inside { &mut bracket.0 } else { &mut bracket.1 }) = middle;
+impl Outline {
+    /// Finds the edge of the shadow, or of the second region, in directions around the centre of the picture, to `pi/2^30` of an angle and the
+    /// error of rays a hundred times as accurate as those of a picture; `None` if the ray of the centre is not captured.
+    ///
+    /// The shadow is assumed to end once along every direction. `directions` is rounded up to a multiple of four.
+    ///
+    /// # Errors
+    /// [`RelativityError`].
+    pub fn of(
+        model: &dyn EulerLagrange<f64>,
+        camera: &Camera,
+        tracing: &Tracing,
+        directions: usize,
+    ) -> Result<Option<Outline>, RelativityError> {
+        expect(directions > 0, "directions", "at least 1", directions as f64)?;
+        let tetrad = Tetrad::new(model, camera)?;
+        let count = directions.next_multiple_of(4);
+        let tracing = Tracing { tolerance: (EDGE_TOLERANCE * tracing.tolerance).max(TOLERANCES.0), ..*tracing };
+        let toward = |k: usize, angle: f64| {
+            let ((sin, cos), (up, right)) = (angle.sin_cos(), (TAU * k as f64 / count as f64).sin_cos());
+            tetrad.ray([sin * right, sin * up, cos])
+        };
+        let captured = |tangents: Vec<[f64; 4]>| -> Result<Vec<bool>, RelativityError> {
+            let starts: Vec<_> = tangents.into_iter().map(|k| (tetrad.event, k)).collect();
+            let rays = trace(model, &camera.chart, &starts, &tracing, &|_| ())?;
+            Ok(rays.iter().map(|ray| !matches!(ray.fate, RayOutcome::Escaped(_))).collect())
+        };
+        if captured(vec![toward(0, 0.0)])? != [true] {
+            return Ok(None);
         }
+        let mut brackets = vec![(0.0, PI); count];
+        for _ in 0..EDGE_HALVINGS {
+            let middles: Vec<f64> = brackets.iter().map(|(low, high)| 0.5 * (low + high)).collect();
+            let inside = captured(middles.iter().enumerate().map(|(k, &angle)| toward(k, angle)).collect())?;
+            for ((bracket, middle), inside) in brackets.iter_mut().zip(middles).zip(inside) {
+                *(if inside { &mut bracket.0 } else { &mut bracket.1 }) = middle;
+            }
+        }
+        let edge = |(k, (low, high)): (usize, (f64, f64))| {
+            let angle = 0.5 * (low + high);
+            Edge { angle, celestial: tetrad.celestial(toward(k, angle)) }
+        };
+        let edges: Vec<Edge> = brackets.into_iter().enumerate().map(edge).collect();
+        let area = area(&edges.iter().map(|edge| edge.celestial).collect::<Vec<_>>());
+        Ok(Some(Outline { edges, area }))
     }
-    let edge = |(k, (low, high)): (usize, (f64, f64))| {
-        let angle = 0.5 * (low + high);
-        Edge { angle, celestial: tetrad.celestial(toward(k, angle)) }
-    };
-    let edges: Vec<Edge> = brackets.into_iter().enumerate().map(edge).collect();
-    let area = area(&edges.iter().map(|edge| edge.celestial).collect::<Vec<_>>());
-    Ok(Some(Outline { edges, area }))
 }
 
 /// Area within a smooth closed curve through an even number of points at equal steps of its parameter, `(x y' - y x')/2` integrated with the

@@ -4,7 +4,7 @@ use super::camera::Tetrad;
 use super::orbits::{norm, product, scaled};
 use super::rays::{RayOutcome, trace};
 use super::*;
-use crate::lagrangian::{EulerLagrange, Interruptible, Lagrangian, Mechanics, MechanicsError, build};
+use crate::lagrangian::{EulerLagrange, Interruptible, Lagrangian, Mechanics, MechanicsError, SystemInstance};
 use crate::scalar::Real;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,7 +28,7 @@ fn flat(signs: [i8; 4]) -> Mechanics<Flat, f64> {
 
 fn hole(name: &str, parameters: &[(&str, &str)]) -> Box<dyn EulerLagrange<f64>> {
     let given: Vec<_> = parameters.iter().map(|(s, x)| (s.to_string(), x.to_string())).collect();
-    build(name, &given).unwrap()
+    SystemInstance::named(name, &given).unwrap().build().unwrap()
 }
 
 fn small(distance: f64, inclination: f64) -> Camera {
@@ -42,7 +42,7 @@ fn rays_of_flat_space_are_straight() {
     let other = Camera { chart: Chart { time: 3, space: [1, 2, 0] }, ..camera };
     let [right, up, forward] = camera.axes();
     for (model, camera) in [(flat([-1, 1, 1, 1]), camera), (flat([-1, -1, -1, 1]), other)] {
-        let seen = shadow(&model, &camera, &Tracing::of(&camera), &|_| ()).unwrap();
+        let seen = Shadow::of(&model, &camera, &Tracing::of(&camera), &|_| ()).unwrap();
         for (pixel, ray) in seen.rays.iter().enumerate() {
             let part = camera.direction((pixel % 30) as f64 + 0.5, (pixel / 30) as f64 + 0.5);
             let RayOutcome::Escaped(found) = ray.fate else { panic!("{ray:?}") };
@@ -54,7 +54,7 @@ fn rays_of_flat_space_are_straight() {
             assert!(ray.steps < 20 && ray.drift < 1e-14, "{ray:?}");
         }
         assert_eq!((seen.share(), seen.unfinished()), (0.0, 0));
-        assert_eq!(outline(&model, &camera, &Tracing::of(&camera), 4), Ok(None));
+        assert_eq!(Outline::of(&model, &camera, &Tracing::of(&camera), 4), Ok(None));
         let tetrad = Tetrad::new(&model, &camera).unwrap();
         let [x, y] = tetrad.celestial(tetrad.ray(camera.direction(30.0, 0.0)));
         let exact = camera.direction(30.0, 0.0);
@@ -97,7 +97,7 @@ fn the_shadow_of_schwarzschild_has_its_angle() {
     for (distance, inclination) in [(20.0, 1.2), (5.0, 0.0), (2.5, FRAC_PI_2)] {
         let camera = small(distance, inclination);
         let tracing = Tracing { far: 60.0, ..Tracing::of(&camera) };
-        let found = outline(&*model, &camera, &tracing, 12).unwrap().unwrap();
+        let found = Outline::of(&*model, &camera, &tracing, 12).unwrap().unwrap();
         let sine = 27f64.sqrt() / distance * (1.0 - 2.0 / distance).sqrt();
         // Within the orbit of light the shadow fills more than half of the sky.
         let exact = if distance < 3.0 { PI - sine.asin() } else { sine.asin() };
@@ -110,7 +110,7 @@ fn the_shadow_of_schwarzschild_has_its_angle() {
     // A camera that falls sees the same rays at other angles.
     let falling = Camera { observer: Observer::Normal, ..small(5.0, 1.0) };
     let tracing = Tracing { far: 60.0, ..Tracing::of(&falling) };
-    let found = outline(&*model, &falling, &tracing, 4).unwrap().unwrap();
+    let found = Outline::of(&*model, &falling, &tracing, 4).unwrap().unwrap();
     for edge in &found.edges {
         assert!((norm(edge.celestial) - 27f64.sqrt()).abs() < 2e-6);
         assert!(edge.angle < (27f64.sqrt() / 5.0 * 0.6f64.sqrt()).asin() - 0.05);
@@ -123,7 +123,7 @@ fn the_shadow_of_kerr_has_its_edges() {
     for spin in [0.9, 0.5] {
         let model = hole("kerr-cartesian", &[("a", &spin.to_string())]);
         let camera = small(20.0, FRAC_PI_2);
-        let found = outline(&*model, &camera, &Tracing::of(&camera), 16).unwrap().unwrap();
+        let found = Outline::of(&*model, &camera, &Tracing::of(&camera), 16).unwrap().unwrap();
         let impact = |a: f64| {
             let light: f64 = 2.0 * (1.0 + (2.0 / 3.0 * (-a).acos()).cos());
             a + light.powf(1.5)
@@ -146,7 +146,7 @@ fn no_result_depends_on_the_number_of_threads() {
     let of = |threads: usize| {
         let done = std::sync::atomic::AtomicUsize::new(0);
         let count = |pixels: usize| _ = done.fetch_add(pixels, std::sync::atomic::Ordering::Relaxed);
-        let seen = shadow(&*model, &camera, &Tracing { threads, ..Tracing::of(&camera) }, &count).unwrap();
+        let seen = Shadow::of(&*model, &camera, &Tracing { threads, ..Tracing::of(&camera) }, &count).unwrap();
         assert_eq!(done.into_inner(), 48 * 36);
         seen
     };
@@ -164,7 +164,7 @@ fn light_stays_light() {
     let model = hole("kerr-cartesian", &[("a", "0.9")]);
     let camera = small(20.0, 1.4);
     for (tolerance, most) in [(1e-6, 1e-3), (1e-8, 1e-5), (1e-10, 1e-7)] {
-        let seen = shadow(&*model, &camera, &Tracing { tolerance, ..Tracing::of(&camera) }, &|_| ()).unwrap();
+        let seen = Shadow::of(&*model, &camera, &Tracing { tolerance, ..Tracing::of(&camera) }, &|_| ()).unwrap();
         assert!(seen.drift() < most, "{tolerance}: {}", seen.drift());
     }
 }
@@ -176,7 +176,7 @@ fn the_sky_is_far_enough() {
     let camera = small(20.0, 1.4);
     let [near, far] = [40.0, 1e5].map(|far| {
         let tracing = Tracing { far, tolerance: 1e-9, ..Tracing::of(&camera) };
-        shadow(&*model, &camera, &tracing, &|_| ()).unwrap()
+        Shadow::of(&*model, &camera, &tracing, &|_| ()).unwrap()
     });
     let difference = near.difference(&far).unwrap();
     assert_eq!(difference.shadow, 0.0);
@@ -206,7 +206,7 @@ fn light_far_from_the_hole_is_deflected_as_it_should_be() {
 fn mistakes_are_named() {
     let camera = small(10.0, 1.0);
     let traced = |model: &dyn EulerLagrange<f64>, camera: Camera, tracing: Tracing| {
-        shadow(model, &camera, &tracing, &|_| ()).unwrap_err().to_string()
+        Shadow::of(model, &camera, &tracing, &|_| ()).unwrap_err().to_string()
     };
     let model = hole("schwarzschild-cartesian", &[]);
     let usual = Tracing::of(&camera);
@@ -219,14 +219,14 @@ fn mistakes_are_named() {
     assert!(traced(&*model, Camera { field_of_view: 4.0, ..camera }, usual).starts_with("field of view"));
     assert!(traced(&*model, camera, Tracing { tolerance: 0.0, ..usual }).starts_with("tolerance"));
     assert!(traced(&*model, camera, Tracing { growth: 1.0, ..usual }).starts_with("growth"));
-    assert!(outline(&*model, &camera, &usual, 0).unwrap_err().to_string().starts_with("directions"));
+    assert!(Outline::of(&*model, &camera, &usual, 0).unwrap_err().to_string().starts_with("directions"));
 }
 
 #[test]
 fn rays_that_do_not_end_are_unfinished() {
     let model = hole("schwarzschild-cartesian", &[]);
     let camera = small(10.0, 1.0);
-    let seen = shadow(&*model, &camera, &Tracing { most_steps: 2, ..Tracing::of(&camera) }, &|_| ()).unwrap();
+    let seen = Shadow::of(&*model, &camera, &Tracing { most_steps: 2, ..Tracing::of(&camera) }, &|_| ()).unwrap();
     assert_eq!((seen.unfinished(), seen.share()), (600, 0.0));
     // The metric is invalid at the origin of the coordinates.
     let start = ([0.0; 4], scaled(2.0, [0.0, 1.0, 0.0, 0.0]));
@@ -240,27 +240,27 @@ fn rays_that_do_not_end_are_unfinished() {
 /// The rays of blocks that were followed before a flag was raised have their ends, the others none.
 #[test]
 fn an_interrupted_picture_has_the_rays_that_were_followed() {
-    let model = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+    let model = SystemInstance::<f64>::named("schwarzschild-cartesian", &[]).unwrap().build().unwrap();
     let flag = AtomicBool::new(false);
     let hole = Interruptible::new(&*model, &flag);
     let camera = Camera { width: 20, height: 20, ..Camera::new(20.0, 1.4) };
     let tracing = Tracing::of(&camera);
-    let whole = shadow(&hole, &camera, &tracing, &|_| ()).unwrap();
-    let part = shadow(&hole, &camera, &tracing, &|_| flag.store(true, Ordering::Relaxed)).unwrap();
+    let whole = Shadow::of(&hole, &camera, &tracing, &|_| ()).unwrap();
+    let part = Shadow::of(&hole, &camera, &tracing, &|_| flag.store(true, Ordering::Relaxed)).unwrap();
     assert_eq!((whole.finished(), part.rays.len()), (400, 400));
     assert!((1..400).contains(&part.finished()), "{}", part.finished());
     for (a, b) in part.rays.iter().zip(&whole.rays).filter(|(a, _)| a.fate != RayOutcome::Unfinished) {
         assert_eq!((a.fate, a.steps), (b.fate, b.steps));
     }
-    assert_eq!(outline(&hole, &camera, &tracing, 4), Err(RelativityError::Mechanics(MechanicsError::Interrupted)));
+    assert_eq!(Outline::of(&hole, &camera, &tracing, 4), Err(RelativityError::Mechanics(MechanicsError::Interrupted)));
 }
 
 /// At both ends of the tolerances every ray comes to an end; beyond them nothing is traced.
 #[test]
 fn tolerances_have_ends() {
-    let model = build::<f64>("schwarzschild-cartesian", &[]).unwrap();
+    let model = SystemInstance::<f64>::named("schwarzschild-cartesian", &[]).unwrap().build().unwrap();
     let camera = Camera { width: 6, height: 6, ..Camera::new(20.0, 1.4) };
-    let of = |tolerance: f64| shadow(&*model, &camera, &Tracing { tolerance, ..Tracing::of(&camera) }, &|_| ());
+    let of = |tolerance: f64| Shadow::of(&*model, &camera, &Tracing { tolerance, ..Tracing::of(&camera) }, &|_| ());
     let (fine, coarse) = (of(TOLERANCES.0).unwrap(), of(TOLERANCES.1).unwrap());
     assert_eq!((fine.unfinished(), coarse.unfinished(), fine.share()), (0, 0, coarse.share()));
     for wrong in [1e-30, 1e-13, 0.02, 1.0, f64::NAN] {
@@ -295,13 +295,13 @@ fn a_wormhole_shows_its_other_side() {
         let camera = Camera { field_of_view, ..small(model.distance(radius), inclination) };
         let [far, second] = [far, -far].map(|l| model.distance(l));
         let tracing = Tracing { far, second, tolerance: 1e-7, ..Tracing::of(&camera) };
-        let found = outline(&model, &camera, &tracing, 4).unwrap().unwrap();
+        let found = Outline::of(&model, &camera, &tracing, 4).unwrap().unwrap();
         for edge in &found.edges {
             assert!((edge.angle - exact).abs() < 1e-6, "{radius}: {} for {exact}", edge.angle);
             assert!((norm(edge.celestial) - throat).abs() < 1e-5, "{radius}: {:?}", edge.celestial);
         }
         assert!((found.radius() - exact).abs() < 1e-6);
-        let seen = shadow(&model, &camera, &tracing, &|_| ()).unwrap();
+        let seen = Shadow::of(&model, &camera, &tracing, &|_| ()).unwrap();
         assert_eq!((seen.share(), seen.unfinished()), (0.0, 0));
         for (pixel, ray) in seen.rays.iter().enumerate() {
             let direction = camera.direction((pixel % 30) as f64 + 0.5, (pixel / 30) as f64 + 0.5);

@@ -179,7 +179,7 @@ pub(super) fn beyond(x: [f64; 3], k: [f64; 3]) -> [f64; 3] {
 mod tests {
     use super::super::tests::Wormhole;
     use super::*;
-    use crate::lagrangian::{Mechanics, build};
+    use crate::lagrangian::{Mechanics, SystemInstance};
 
     /// The accelerations are those of the Lagrangian `g_ij v_i v_j/2` of the mass matrix that is given.
     #[test]
@@ -228,7 +228,14 @@ mod tests {
     #[test]
     fn charts_with_one_side_are_refused() {
         let one_sided = |name: &str| {
-            let refused = TwoSided::new(build::<f64>(name, &[]).unwrap(), 0, [1, 2, 3], 20.0, 2e3).err();
+            let refused = TwoSided::new(
+                SystemInstance::<f64>::named(name, &[]).unwrap().build().unwrap(),
+                0,
+                [1, 2, 3],
+                20.0,
+                2e3,
+            )
+            .err();
             assert!(matches!(refused, Some(RelativityError::OneSided { .. })), "{name}: {refused:?}");
         };
         one_sided("schwarzschild-geodesic");

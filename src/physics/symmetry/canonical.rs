@@ -124,10 +124,10 @@ fn positive<S: Scalar>(n: usize, matrix: &[S], signs: Inertia) -> bool {
 /// It is an [`EulerLagrange`] if the model is one, with accelerations equal to the bit, and a [`Lagrangian`] if the model is one.
 ///
 /// ```
-/// use lnn::lagrangian::{EulerLagrange, Request, Terms, build};
+/// use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 /// use lnn::symmetry::{Canonical, CanonicalForm};
 ///
-/// let arm = build::<f64>("double-pendulum", &[])?;
+/// let arm = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
 /// let (q0, v0) = ([0.3, -0.2], [1.0, 0.5]);
 /// let canonical = Canonical::at(arm, &q0, &v0)?;
 /// let mut terms = Terms::default();

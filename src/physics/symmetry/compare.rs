@@ -44,56 +44,58 @@ pub struct Comparison {
     pub energy: f64,
 }
 
-/// Compares two Lagrangians at states `(q, v)`, `(states, n)`, apart from the freedom that `L` has.
-///
-/// At best, motion determines `L` up to a factor for each group of coordinates that act on each other, a total derivative, `L -> s L +
-/// dF(q)/dt`, and a constant. For geodesics, along which `L` is the energy, it does so up to a function `f(L)`, where `B` is the metric.
-/// The best `s` (or `f`, a polynomial of degree 3), follows by linear least squares from the mass matrices, which do not depend on a gauge;
-/// `F`, over the functions of a basis, follows from the momenta, both in the frame of `|M|` of `B`; the constant follows from the values.
-/// They are removed, and the residual is reported for each quantity. For two metrics `f` is a factor. Where `B` has the same value `B0` at
-/// all states, as on a mass shell, motion does not depend on `(B - B0)^2 h(q, v)`: `f` is a factor, and the part `h p p^T` of the mass
-/// matrices is ignored at every state.
-///
-/// # Errors
-/// [`SymmetryError`].
-pub fn compare(
-    a: &dyn EulerLagrange<f64>,
-    b: &dyn EulerLagrange<f64>,
-    basis: &Basis,
-    (q, v): (&[f64], &[f64]),
-) -> Result<Comparison, SymmetryError> {
-    if a.coordinates() != b.coordinates() || basis.names().len() != b.coordinates() {
-        let found = if a.coordinates() == b.coordinates() { basis.names().len() } else { a.coordinates() };
-        return Err(SymmetryError::Basis { expected: b.coordinates(), found });
+impl Comparison {
+    /// Compares two Lagrangians at states `(q, v)`, `(states, n)`, apart from the freedom that `L` has.
+    ///
+    /// At best, motion determines `L` up to a factor for each group of coordinates that act on each other, a total derivative, `L -> s L +
+    /// dF(q)/dt`, and a constant. For geodesics, along which `L` is the energy, it does so up to a function `f(L)`, where `B` is the metric.
+    /// The best `s` (or `f`, a polynomial of degree 3), follows by linear least squares from the mass matrices, which do not depend on a gauge;
+    /// `F`, over the functions of a basis, follows from the momenta, both in the frame of `|M|` of `B`; the constant follows from the values.
+    /// They are removed, and the residual is reported for each quantity. For two metrics `f` is a factor. Where `B` has the same value `B0` at
+    /// all states, as on a mass shell, motion does not depend on `(B - B0)^2 h(q, v)`: `f` is a factor, and the part `h p p^T` of the mass
+    /// matrices is ignored at every state.
+    ///
+    /// # Errors
+    /// [`SymmetryError`].
+    pub fn of(
+        a: &dyn EulerLagrange<f64>,
+        b: &dyn EulerLagrange<f64>,
+        basis: &Basis,
+        (q, v): (&[f64], &[f64]),
+    ) -> Result<Comparison, SymmetryError> {
+        if a.coordinates() != b.coordinates() || basis.names().len() != b.coordinates() {
+            let found = if a.coordinates() == b.coordinates() { basis.names().len() } else { a.coordinates() };
+            return Err(SymmetryError::Basis { expected: b.coordinates(), found });
+        }
+        check_size(b.coordinates(), unknowns(b.coordinates(), basis.len()), q.len() / b.coordinates().max(1))?;
+        let regrouped = Regrouped::nearest(b, a, (q, v));
+        let b = regrouped.as_ref().map_or(b, |regrouped| regrouped as &dyn EulerLagrange<f64>);
+        // States at which both are finite.
+        let of_a = Sample::new(a, q, v)?;
+        let of_b = Sample::new(b, &of_a.q, &of_a.v)?;
+        let of_a = Sample::new(a, &of_b.q, &of_b.v)?;
+        let [mut first, mut second] = [Terms::default(), Terms::default()];
+        for (model, terms) in [(a, &mut first), (b, &mut second)] {
+            // A state whose mass matrix is singular has no acceleration to compare.
+            let _ = model.terms(&of_b.q, &of_b.v, Request::ACCELERATION, terms);
+        }
+        let fit = Fit::new((&of_a, &of_b), [&first, &second], basis)?;
+        let (mass_matrix, motion, motionless_states) = fit.mechanics([&first, &second], &of_b)?;
+        let energy = fit.energy(&of_a, &of_b);
+        Ok(Comparison {
+            gauge_formula: field::sum(fit.known_gauge.iter().enumerate().map(|(f, c)| (*c, basis.text(f)))),
+            factors: fit.factors,
+            group_factors: regrouped.as_ref().map_or(Vec::new(), |regrouped| regrouped.factors.clone()),
+            on_shell: fit.on_shell,
+            gauge: fit.gauge,
+            constant: fit.constant,
+            lagrangian: fit.rest,
+            motion,
+            motionless_states,
+            mass_matrix,
+            energy,
+        })
     }
-    check_size(b.coordinates(), unknowns(b.coordinates(), basis.len()), q.len() / b.coordinates().max(1))?;
-    let regrouped = Regrouped::nearest(b, a, (q, v));
-    let b = regrouped.as_ref().map_or(b, |regrouped| regrouped as &dyn EulerLagrange<f64>);
-    // States at which both are finite.
-    let of_a = Sample::new(a, q, v)?;
-    let of_b = Sample::new(b, &of_a.q, &of_a.v)?;
-    let of_a = Sample::new(a, &of_b.q, &of_b.v)?;
-    let [mut first, mut second] = [Terms::default(), Terms::default()];
-    for (model, terms) in [(a, &mut first), (b, &mut second)] {
-        // A state whose mass matrix is singular has no acceleration to compare.
-        let _ = model.terms(&of_b.q, &of_b.v, Request::ACCELERATION, terms);
-    }
-    let fit = Fit::new((&of_a, &of_b), [&first, &second], basis)?;
-    let (mass_matrix, motion, motionless_states) = fit.mechanics([&first, &second], &of_b)?;
-    let energy = fit.energy(&of_a, &of_b);
-    Ok(Comparison {
-        gauge_formula: field::sum(fit.known_gauge.iter().enumerate().map(|(f, c)| (*c, basis.text(f)))),
-        factors: fit.factors,
-        group_factors: regrouped.as_ref().map_or(Vec::new(), |regrouped| regrouped.factors.clone()),
-        on_shell: fit.on_shell,
-        gauge: fit.gauge,
-        constant: fit.constant,
-        lagrangian: fit.rest,
-        motion,
-        motionless_states,
-        mass_matrix,
-        energy,
-    })
 }
 
 /// The best `f` and `F`.

@@ -97,50 +97,52 @@ pub struct Quadratic {
     pub conserved: Vec<Conserved>,
 }
 
-/// Finds conserved quantities `k^ij p_i p_j + h E + k^i p_i + k` whose factors are functions of a basis.
-///
-/// Along the motion `dq/dt = v`, and `dp/dt` is `dL/dq` plus forces that are not in `L`, so that `dK/dt = 0` is linear in the unknown
-/// functions; it is imposed at the states `(q, v)`, `(states, n)`. The function `h` times the energy `E` reaches quantities whose part
-/// without momenta is the potential times a function, or whose tensor has a part along the inverse metric, whatever formulas these have;
-/// the Kepler problem and Kerr's metric need it. For a Lagrangian that is even in the velocities, only even quantities are sought, because
-/// the odd ones are the charges of point symmetries. The functions do not depend on coordinates that `L` does not depend on, except through
-/// the first harmonics of one such angle at a time.
-///
-/// `fields` are the point symmetries, of the same basis; products of their charges are not new. For `tolerance` see
-/// [`symmetries`](super::symmetries).
-///
-/// # Errors
-/// [`SymmetryError`].
-pub fn quadratic(
-    model: &dyn EulerLagrange<f64>,
-    basis: &Basis,
-    fields: &[Field],
-    (q, v): (&[f64], &[f64]),
-    tolerance: Option<f64>,
-) -> Result<Quadratic, SymmetryError> {
-    let n = model.coordinates();
-    check(tolerance)?;
-    if basis.names().len() != n {
-        return Err(SymmetryError::Basis { expected: n, found: basis.names().len() });
+impl Quadratic {
+    /// Finds conserved quantities `k^ij p_i p_j + h E + k^i p_i + k` whose factors are functions of a basis.
+    ///
+    /// Along the motion `dq/dt = v`, and `dp/dt` is `dL/dq` plus forces that are not in `L`, so that `dK/dt = 0` is linear in the unknown
+    /// functions; it is imposed at the states `(q, v)`, `(states, n)`. The function `h` times the energy `E` reaches quantities whose part
+    /// without momenta is the potential times a function, or whose tensor has a part along the inverse metric, whatever formulas these have;
+    /// the Kepler problem and Kerr's metric need it. For a Lagrangian that is even in the velocities, only even quantities are sought, because
+    /// the odd ones are the charges of point symmetries. The functions do not depend on coordinates that `L` does not depend on, except through
+    /// the first harmonics of one such angle at a time.
+    ///
+    /// `fields` are the point symmetries, of the same basis; products of their charges are not new. For `tolerance` see
+    /// [`Symmetries::find`](super::Symmetries::find).
+    ///
+    /// # Errors
+    /// [`SymmetryError`].
+    pub fn find(
+        model: &dyn EulerLagrange<f64>,
+        basis: &Basis,
+        fields: &[Field],
+        (q, v): (&[f64], &[f64]),
+        tolerance: Option<f64>,
+    ) -> Result<Quadratic, SymmetryError> {
+        let n = model.coordinates();
+        check(tolerance)?;
+        if basis.names().len() != n {
+            return Err(SymmetryError::Basis { expected: n, found: basis.names().len() });
+        }
+        // 1, the energy, its square, charges, their products with the energy and with each other.
+        let products = 3 + 2 * fields.len() + fields.len() * (fields.len() + 1) / 2;
+        check_size(n, products, q.len() / n.max(1))?;
+        let sample = Sample::new(model, q, v)?;
+        let known = known(&sample, basis, fields);
+        let cyclic = sample.cyclic();
+        let mut all: Option<Quadratic> = None;
+        for angle in std::iter::once(None).chain(basis.circles().filter(|i| cyclic[*i]).map(Some)) {
+            let part = search(&sample, &basis.without(&cyclic, angle), &known, tolerance)?;
+            all = Some(match all {
+                None => part,
+                Some(all) => all.with(part),
+            });
+        }
+        Ok(all.unwrap_or_else(|| unreachable!("there is a search without an angle")))
     }
-    // 1, the energy, its square, charges, their products with the energy and with each other.
-    let products = 3 + 2 * fields.len() + fields.len() * (fields.len() + 1) / 2;
-    check_size(n, products, q.len() / n.max(1))?;
-    let sample = Sample::new(model, q, v)?;
-    let known = known(&sample, basis, fields);
-    let cyclic = sample.cyclic();
-    let mut all: Option<Quadratic> = None;
-    for angle in std::iter::once(None).chain(basis.circles().filter(|i| cyclic[*i]).map(Some)) {
-        let part = search(&sample, &basis.without(&cyclic, angle), &known, tolerance)?;
-        all = Some(match all {
-            None => part,
-            Some(all) => all.with(part),
-        });
-    }
-    Ok(all.unwrap_or_else(|| unreachable!("there is a search without an angle")))
 }
 
-/// Number of unknown coefficients in the largest search of [`quadratic`] over a basis of `functions` functions.
+/// Number of unknown coefficients in the largest search of [`Quadratic::find`] over a basis of `functions` functions.
 pub fn quadratic_unknowns(n: usize, functions: usize) -> usize {
     (n * (n + 1) / 2 + n + 2) * functions
 }

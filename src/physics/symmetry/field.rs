@@ -171,77 +171,79 @@ pub struct Charge {
     pub by_integrator: f64,
 }
 
-/// The energy `E = p.v - L` and the charges `p.xi - F` of fields over a basis along a motion, the energy first.
-///
-/// A charge would stay the same if the model had the symmetry and the integrator made no error. The model's contribution to its drift is
-/// integrated over the samples by Simpson's rule, so the samples should be dense.
-///
-/// # Errors
-/// [`SymmetryError::Basis`] for a basis or a motion of another number of coordinates, [`SymmetryError::States`] if terms are not
-/// finite somewhere.
-pub fn charges(
-    model: &dyn EulerLagrange<f64>,
-    basis: &Basis,
-    fields: &[Field],
-    motion: &Trajectory<f64>,
-) -> Result<Vec<Charge>, SymmetryError> {
-    let n = model.coordinates();
-    for found in [basis.names().len(), motion.coordinates] {
-        if found != n {
-            return Err(SymmetryError::Basis { expected: n, found });
-        }
-    }
-    let request = Request::ENERGY | Request::DL_DQ | Request::FORCE;
-    let (mut terms, mut at) = (Terms::default(), Values::default());
-    let mut series = vec![(Vec::with_capacity(motion.len()), Vec::with_capacity(motion.len())); fields.len() + 1];
-    for (q, v) in motion.q.chunks(STATES_AT_ONCE * n).zip(motion.v.chunks(STATES_AT_ONCE * n)) {
-        let found = series[0].0.len();
-        let failed = |_| SymmetryError::States { states: motion.len(), found };
-        model.terms(q, v, request, &mut terms).map_err(failed)?;
-        for (k, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
-            let one = k * n..(k + 1) * n;
-            let (p, g) = (&terms.momentum[one.clone()], &terms.dl_dq[one.clone()]);
-            series[0].0.push(terms.energy[k]);
-            series[0].1.push(terms.dissipation.get(k).map_or(0.0, |power| -power));
-            basis.evaluate(q, &mut at);
-            for (field, (values, rates)) in fields.iter().zip(&mut series[1..]) {
-                values.push(field.charge(&at, p));
-                // Friction changes momenta too.
-                let force = terms.force.get(one.clone()).unwrap_or(&[]);
-                let pull: f64 = field.vector(&at, n).iter().zip(force).map(|(x, f)| x * f).sum();
-                rates.push(field.breaking(&at, v, p, g) + pull);
+impl Charge {
+    /// The energy `E = p.v - L` and the charges `p.xi - F` of fields over a basis along a motion, the energy first.
+    ///
+    /// A charge would stay the same if the model had the symmetry and the integrator made no error. The model's contribution to its drift is
+    /// integrated over the samples by Simpson's rule, so the samples should be dense.
+    ///
+    /// # Errors
+    /// [`SymmetryError::Basis`] for a basis or a motion of another number of coordinates, [`SymmetryError::States`] if terms are not
+    /// finite somewhere.
+    pub fn of(
+        model: &dyn EulerLagrange<f64>,
+        basis: &Basis,
+        fields: &[Field],
+        motion: &Trajectory<f64>,
+    ) -> Result<Vec<Charge>, SymmetryError> {
+        let n = model.coordinates();
+        for found in [basis.names().len(), motion.coordinates] {
+            if found != n {
+                return Err(SymmetryError::Basis { expected: n, found });
             }
         }
+        let request = Request::ENERGY | Request::DL_DQ | Request::FORCE;
+        let (mut terms, mut at) = (Terms::default(), Values::default());
+        let mut series = vec![(Vec::with_capacity(motion.len()), Vec::with_capacity(motion.len())); fields.len() + 1];
+        for (q, v) in motion.q.chunks(STATES_AT_ONCE * n).zip(motion.v.chunks(STATES_AT_ONCE * n)) {
+            let found = series[0].0.len();
+            let failed = |_| SymmetryError::States { states: motion.len(), found };
+            model.terms(q, v, request, &mut terms).map_err(failed)?;
+            for (k, (q, v)) in q.chunks_exact(n).zip(v.chunks_exact(n)).enumerate() {
+                let one = k * n..(k + 1) * n;
+                let (p, g) = (&terms.momentum[one.clone()], &terms.dl_dq[one.clone()]);
+                series[0].0.push(terms.energy[k]);
+                series[0].1.push(terms.dissipation.get(k).map_or(0.0, |power| -power));
+                basis.evaluate(q, &mut at);
+                for (field, (values, rates)) in fields.iter().zip(&mut series[1..]) {
+                    values.push(field.charge(&at, p));
+                    // Friction changes momenta too.
+                    let force = terms.force.get(one.clone()).unwrap_or(&[]);
+                    let pull: f64 = field.vector(&at, n).iter().zip(force).map(|(x, f)| x * f).sum();
+                    rates.push(field.breaking(&at, v, p, g) + pull);
+                }
+            }
+        }
+        let finite = |(values, rates): &(Vec<f64>, Vec<f64>)| values.iter().chain(rates).all(|x| x.is_finite());
+        if !series.iter().all(finite) {
+            return Err(SymmetryError::States { states: motion.len(), found: 0 });
+        }
+        Ok(series
+            .into_iter()
+            .map(|(values, rates)| {
+                let drift = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
+                let by_model = integral(&motion.t, &rates);
+                Charge { values, drift, by_model, by_integrator: drift - by_model }
+            })
+            .collect())
     }
-    let finite = |(values, rates): &(Vec<f64>, Vec<f64>)| values.iter().chain(rates).all(|x| x.is_finite());
-    if !series.iter().all(finite) {
-        return Err(SymmetryError::States { states: motion.len(), found: 0 });
-    }
-    Ok(series
-        .into_iter()
-        .map(|(values, rates)| {
-            let drift = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
-            let by_model = integral(&motion.t, &rates);
-            Charge { values, drift, by_model, by_integrator: drift - by_model }
-        })
-        .collect())
 }
 
-/// The [`charges`] of an exact Lagrangian along the motion of a learned one.
+/// The [`Charge::of`] of an exact Lagrangian along the motion of a learned one.
 ///
 /// They do not depend on the factor and the gauge up to which a learned Lagrangian is determined. The part of the model is the integral of
 /// `xi.M (a_learned - a_exact)`, for the energy that of `v.M (a_learned - a_exact)`, with `M` and `a_exact` of the exact Lagrangian, which
 /// must have the symmetries and no friction; the rest is due to the integrator.
 ///
 /// # Errors
-/// Returns the same errors as [`charges`].
+/// Returns the same errors as [`Charge::of`].
 pub fn drifts(
     (exact, learned): (&dyn EulerLagrange<f64>, &dyn EulerLagrange<f64>),
     basis: &Basis,
     fields: &[Field],
     motion: &Trajectory<f64>,
 ) -> Result<Vec<Charge>, SymmetryError> {
-    let mut all = charges(exact, basis, fields, motion)?;
+    let mut all = Charge::of(exact, basis, fields, motion)?;
     let n = exact.coordinates();
     let (mut right, mut other, mut at) = (Terms::default(), Terms::default(), Values::default());
     let mut rates = vec![Vec::with_capacity(motion.len()); all.len()];

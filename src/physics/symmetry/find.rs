@@ -63,34 +63,39 @@ impl FunctionColumns {
     }
 }
 
-/// Finds the point symmetries of a Lagrangian whose fields are made of a basis.
-///
-/// A field `xi(q)` is a symmetry if `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow changes `L` by a total
-/// derivative, and `p.xi - F` is conserved (Noether 1918). Of `L = g_ij v^i v^j / 2` these are the Killing fields. The equation is linear
-/// in the coefficients of `xi` and `F`; it is imposed at the states `(q, v)`, `(states, n)`, each relative to the size of the terms of `L`
-/// there, `F` is projected out, and `xi` is measured by its length `|xi|_M` in an orthonormal frame of the mass matrix, averaged over the
-/// states. The singular values then do not depend on how the fields are written, and the zero ones are the symmetries. If `L` does not
-/// depend on time, it also has the symmetry of time, which is not counted.
-///
-/// `tolerance` is the noise of the terms, [`EXACT`](super::EXACT) for a Lagrangian written down; without one, for a learned model, the largest
-/// gap decides (see [`Separation`]). States should be drawn from an open set, several times as many as there are unknown
-/// coefficients.
-///
-/// # Errors
-/// [`SymmetryError`].
-pub fn symmetries(
-    model: &dyn EulerLagrange<f64>,
-    basis: &Basis,
-    (q, v): (&[f64], &[f64]),
-    tolerance: Option<f64>,
-) -> Result<Symmetries, SymmetryError> {
-    let n = model.coordinates();
-    check(tolerance)?;
-    if basis.names().len() != n {
-        return Err(SymmetryError::Basis { expected: n, found: basis.names().len() });
+impl Symmetries {
+    /// Noise of exact terms, the tolerance for a Lagrangian written down.
+    pub const EXACT: f64 = super::thresholds::EXACT;
+
+    /// Finds the point symmetries of a Lagrangian whose fields are made of a basis.
+    ///
+    /// A field `xi(q)` is a symmetry if `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow changes `L` by a total
+    /// derivative, and `p.xi - F` is conserved (Noether 1918). Of `L = g_ij v^i v^j / 2` these are the Killing fields. The equation is linear
+    /// in the coefficients of `xi` and `F`; it is imposed at the states `(q, v)`, `(states, n)`, each relative to the size of the terms of `L`
+    /// there, `F` is projected out, and `xi` is measured by its length `|xi|_M` in an orthonormal frame of the mass matrix, averaged over the
+    /// states. The singular values then do not depend on how the fields are written, and the zero ones are the symmetries. If `L` does not
+    /// depend on time, it also has the symmetry of time, which is not counted.
+    ///
+    /// `tolerance` is the noise of the terms, [`EXACT`](Self::EXACT) for a Lagrangian written down; without one, for a learned model, the largest
+    /// gap decides (see [`Separation`]). States should be drawn from an open set, several times as many as there are unknown
+    /// coefficients.
+    ///
+    /// # Errors
+    /// [`SymmetryError`].
+    pub fn find(
+        model: &dyn EulerLagrange<f64>,
+        basis: &Basis,
+        (q, v): (&[f64], &[f64]),
+        tolerance: Option<f64>,
+    ) -> Result<Symmetries, SymmetryError> {
+        let n = model.coordinates();
+        check(tolerance)?;
+        if basis.names().len() != n {
+            return Err(SymmetryError::Basis { expected: n, found: basis.names().len() });
+        }
+        check_size(n, unknowns(n, basis.len()), q.len() / n.max(1))?;
+        search(&Sample::new(model, q, v)?, basis, tolerance)
     }
-    check_size(n, unknowns(n, basis.len()), q.len() / n.max(1))?;
-    search(&Sample::new(model, q, v)?, basis, tolerance)
 }
 
 /// Refuses a search that would take too much memory or time.
@@ -107,7 +112,7 @@ pub(super) fn check_size(n: usize, unknowns: usize, states: usize) -> Result<(),
     }
 }
 
-/// [`symmetries`] of a Lagrangian whose terms are given.
+/// [`Symmetries::find`] of a Lagrangian whose terms are given.
 pub(crate) fn search(sample: &Sample, basis: &Basis, tolerance: Option<f64>) -> Result<Symmetries, SymmetryError> {
     let (n, states, functions) = (sample.n, sample.len(), basis.len());
     let columns = FunctionColumns::new(basis, sample)?;

@@ -2,22 +2,22 @@
 //!
 //! A point symmetry is a vector field `xi(q)` with `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow maps motions
 //! to motions, and its charge `p.xi - F` is conserved (Noether 1918). Of geodesics these are the Killing fields of the metric.
-//! [`symmetries`] finds them over a [`Basis`] of functions of the coordinates, as the null space of linear equations at sampled states,
+//! [`Symmetries::find`] finds them over a [`Basis`] of functions of the coordinates, as the null space of linear equations at sampled states,
 //! names the Lie [`Algebra`] that they form, and reports if there is no gap between singular values that vanish and those that do not.
-//! [`quadratic`] finds conserved quantities of second degree in the momenta, such as Carter's constant and the vector of Runge and Lenz;
-//! [`charges`] follows charges along a motion; [`compare`] removes the freedom of a Lagrangian, its factor and gauge, before it compares,
+//! [`Quadratic::find`] finds conserved quantities of second degree in the momenta, such as Carter's constant and the vector of Runge and Lenz;
+//! [`Charge::of`] follows charges along a motion; [`Comparison::of`] removes the freedom of a Lagrangian, its factor and gauge, before it compares,
 //! and [`Canonical`] fixes both at a base state. All of them accept systems, descriptions in files and learned models.
 //!
 //! ```
-//! use lnn::lagrangian::build;
-//! use lnn::symmetry::{Basis, Chart, Degrees, EXACT, Region, symmetries};
+//! use lnn::lagrangian::SystemInstance;
+//! use lnn::symmetry::{Basis, Chart, Degrees, Region, Symmetries};
 //!
-//! let sphere = build::<f64>("sphere-geodesic", &[])?;
+//! let sphere = SystemInstance::<f64>::named("sphere-geodesic", &[])?.build()?;
 //! let (names, charts) = (["theta", "phi"].map(String::from), [Chart::Polar, Chart::Circle]);
 //! let basis = Basis::new(&names, &charts, Degrees::usual(&charts));
 //! let region = Region { position: vec![[0.3, 2.8], [0.0, 6.3]], velocity: vec![[-1.0, 1.0]; 2] };
 //! let (q, v) = region.states(200, 0, |_, _| true);
-//! let found = symmetries(&*sphere, &basis, (&q, &v), Some(EXACT))?;
+//! let found = Symmetries::find(&*sphere, &basis, (&q, &v), Some(Symmetries::EXACT))?;
 //! assert_eq!(found.separation.count, Some(3));
 //! assert_eq!(found.fields[2].text(&basis), "d_phi");
 //! assert_eq!(found.fields[0].text(&basis), "sin(phi) d_theta + cot(theta)*cos(phi) d_phi");
@@ -47,14 +47,13 @@ mod thresholds;
 pub use algebra::Algebra;
 pub use basis::{Basis, Chart, Degrees};
 pub use canonical::{Canonical, CanonicalForm};
-pub use compare::{Comparison, compare};
-pub use conserved::{Conserved, Quadratic, quadratic};
-pub use field::{Charge, Field, charges};
-pub use find::{Symmetries, symmetries};
+pub use compare::Comparison;
+pub use conserved::{Conserved, Quadratic};
+pub use field::{Charge, Field};
+pub use find::Symmetries;
 pub use null_space::Separation;
 pub use sample::{Invariant, Region};
 pub use says::{ComparisonSummary, QuadraticSummary, SymmetrySummary};
-pub use thresholds::EXACT;
 
 // For the packages of this repository.
 #[doc(hidden)]

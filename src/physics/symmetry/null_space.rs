@@ -6,7 +6,7 @@ use super::thresholds::{
     REFINED_ROUNDING, ROUNDING_ENTRY, SPARSE_LEAST_RESIDUAL, SPARSE_PENALTY, SPARSE_RESIDUAL, SPARSE_STEPS,
     SPARSE_WIDTH, SPARSE_ZERO, STATES_PER_UNKNOWN, TOLERANCES,
 };
-use super::{Basis, Chart, Degrees, EXACT, Symmetries, SymmetryError, symmetries};
+use super::{Basis, Chart, Degrees, Symmetries, SymmetryError};
 use crate::lagrangian::EulerLagrange;
 use crate::linalg::{MatMut, MatRef, Workspace, gemm, solve};
 use serde::Serialize;
@@ -92,7 +92,7 @@ pub fn enough(unknowns: usize, exact: bool) -> usize {
 }
 
 /// Point symmetries in the basis that shows the most of them, or, if several do, in the one with the widest gap; `tolerance` as in
-/// [`symmetries`], [`EXACT`] for exact terms if there is none.
+/// [`Symmetries::find`], [`Symmetries::EXACT`] for exact terms if there is none.
 ///
 /// # Errors
 /// [`SymmetryError`].
@@ -102,10 +102,10 @@ pub fn most_symmetries(
     (q, v): (&[f64], &[f64]),
     (tolerance, exact): (Option<f64>, bool),
 ) -> Result<(Symmetries, Degrees), SymmetryError> {
-    let tolerance = tolerance.or(exact.then_some(EXACT));
+    let tolerance = tolerance.or(exact.then_some(Symmetries::EXACT));
     let mut best: Option<(Symmetries, Degrees)> = None;
     for (basis, degrees) in bases {
-        let found = symmetries(model, &basis, (q, v), tolerance)?;
+        let found = Symmetries::find(model, &basis, (q, v), tolerance)?;
         let rank = |found: &Symmetries| (found.separation.count, found.separation.gap.unwrap_or(f64::INFINITY));
         if best.as_ref().is_none_or(|(best, _)| rank(&found) > rank(best)) {
             best = Some((found, degrees));

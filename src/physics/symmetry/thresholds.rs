@@ -6,7 +6,7 @@
 // ---- Singular values that count as zero ----
 
 /// Noise of exact terms: singular values below it are zero.
-pub const EXACT: f64 = 1e-8;
+pub(super) const EXACT: f64 = 1e-8;
 /// Largest value that may be meant to be zero if the noise is unknown: a tenth of its size without a symmetry.
 pub(super) const MOST_ZERO_VALUE: f64 = 0.1;
 /// Tolerances that can be used: from the rounding of a number near 1 to the largest value that may be meant to be zero.

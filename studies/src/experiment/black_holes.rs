@@ -3,7 +3,7 @@
 use super::experiments::{Experiment, Picture};
 use lnn::configuration::Config;
 use lnn::experiments::{Reported, Run, slug};
-use lnn::lagrangian::{SystemInstance, configure};
+use lnn::lagrangian::SystemInstance;
 use lnn::network::Structure;
 use lnn::presets::Preset;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 const HOLES: [&str; 2] = ["schwarzschild-cartesian", "kerr-cartesian"];
 
 fn hole(name: &str) -> SystemInstance<f64> {
-    configure(name, &[]).unwrap_or_else(|e| unreachable!("{e}"))
+    SystemInstance::named(name, &[]).unwrap_or_else(|e| unreachable!("{e}"))
 }
 
 fn run(name: &str, label: String, config: Config) -> Run {

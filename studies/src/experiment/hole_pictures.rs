@@ -1,6 +1,6 @@
 //! Pictures of a learned black hole beside the exact one: orbits, shadow and sky.
 
-use lnn::relativity::{Camera, CentralCoordinates, Image, LearnedHole, Sky, Tracing, difference_image, orbits, shadow};
+use lnn::relativity::{Camera, CentralCoordinates, Image, LearnedHole, Shadow, Sky, Tracing, difference_image, orbits};
 use lnn::report::{OrbitPlot, Picture, Series, orbit_picture, png};
 
 /// Distance of the camera over the mass, and its angle from the axis.
@@ -51,7 +51,7 @@ pub fn sky_picture(
         if interrupted() {
             return None;
         }
-        views.push(shadow(model, &camera, &tracing, &|_| ()).ok()?);
+        views.push(Shadow::of(model, &camera, &tracing, &|_| ()).ok()?);
     }
     let sky = Sky::around(&camera);
     let mut images: Vec<Image> = views.iter().map(|view| sky.image(view)).collect();

@@ -17,7 +17,7 @@ use figures::Curve;
 use lnn::experiments::Run;
 use lnn::findings::text_table;
 use lnn::lagrangian::SystemInstance;
-use lnn::recording::{Columns, read_recording};
+use lnn::recording::{Columns, LoadedRecording};
 use lnn::relativity::depends_on_time;
 use lnn_cli::{CliError, Orders, Shard, Work, merge, perform, print, print_list};
 use planned::Planned;
@@ -249,7 +249,7 @@ fn beside(text: &str) -> Result<(String, PathBuf), String> {
 fn curve((label, file): &(String, PathBuf)) -> Result<Curve, CliError> {
     let [time, loss] = ["seconds", "validation_loss"].map(str::to_string);
     let columns = Columns { coords: vec![loss], time: Some(time), ..Columns::default() };
-    let reading = read_recording(&[file], &columns).map_err(CliError::data)?;
+    let reading = LoadedRecording::read(&[file], &columns).map_err(CliError::data)?;
     let points = |track: lnn::recording::RecordedTrajectory| track.times.into_iter().zip(track.q).collect::<Vec<_>>();
     Ok(Curve { label: label.clone(), points: reading.recording.tracks.into_iter().flat_map(points).collect() })
 }

@@ -4,7 +4,7 @@
 use super::experiments::{Experiment, Picture};
 use lnn::configuration::Config;
 use lnn::experiments::{Reported, Run};
-use lnn::lagrangian::{configure, find};
+use lnn::lagrangian::{System, SystemInstance};
 use lnn::optimizers::Method;
 use lnn::presets::Preset;
 
@@ -13,7 +13,7 @@ const ALL: &[Picture] = &[Picture::Evaluation(&[""])];
 
 /// The paper's training of a system.
 fn system(name: &str, reported: Reported) -> Vec<Run> {
-    let title = find(name).map_or(name, |system| system.title.as_ref());
+    let title = System::named(name).map_or(name, |system| system.title.as_ref());
     vec![run(name, title, config_of(Preset::Paper, name), reported)]
 }
 
@@ -84,7 +84,7 @@ const SYSTEMS: [(&str, Reported); 5] = [
 
 /// The configuration of a preset for a system of the paper.
 pub(super) fn config_of(preset: Preset, system: &str) -> Config {
-    let configured = configure(system, &[]).unwrap_or_else(|e| unreachable!("{e}"));
+    let configured = SystemInstance::named(system, &[]).unwrap_or_else(|e| unreachable!("{e}"));
     preset.config(&configured).unwrap_or_else(|| unreachable!("a system of the paper"))
 }
 

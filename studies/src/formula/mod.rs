@@ -14,11 +14,11 @@ mod cases;
 use crate::{ARMS, results};
 use cases::{CART_POLES, CLEAN, Case, FRICTION, METRICS, Metric, OUTSIDE, POSITIONS, Recorded};
 use clap::ValueEnum;
-use lnn::formula::{FormulaOptions, FoundFormula, Verdict, formula_of_model, formula_of_motion};
-use lnn::lagrangian::configure;
+use lnn::formula::{FormulaOptions, FoundFormula, Verdict};
+use lnn::lagrangian::SystemInstance;
 use lnn::network::Structure;
 use lnn::presets::Preset;
-use lnn::recording::{Columns, read_recording};
+use lnn::recording::{Columns, LoadedRecording};
 use lnn::training::{Hooks, run as train};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -63,7 +63,7 @@ fn search(case: &Case, how: Recorded, show: bool) -> Outcome {
     let started = processor_time();
     let mut options = case.options(how.seed);
     options.scale = None;
-    match formula_of_motion(&recording, &options) {
+    match FoundFormula::of_motion(&recording, &options) {
         Ok(found) => {
             let seconds = processor_time() - started;
             let (right, error) = judge(case.truth, &found, how.force > 0.0);
@@ -191,7 +191,7 @@ fn arms(folder: &Path, only: &str) {
         let coords: Vec<String> = (1..=n).map(|i| format!("theta{i}")).collect();
         let columns =
             Columns { periodic: coords.clone(), coords, trajectory: Some("run".into()), ..Columns::default() };
-        let mut recording = read_recording(&[&path], &columns).expect("the columns of the authors").recording;
+        let mut recording = LoadedRecording::read(&[&path], &columns).expect("the columns of the authors").recording;
         for track in &mut recording.tracks {
             let rows = track.q.chunks_exact(n).step_by(ARMS_EVERY);
             track.q = rows.flatten().copied().collect();
@@ -205,7 +205,7 @@ fn arms(folder: &Path, only: &str) {
         let noise = Some(vec![ARMS_NOISE; n]);
         let options =
             FormulaOptions { friction: true, gyroscopic: false, noise, threads: 2, ..FormulaOptions::default() };
-        let found = formula_of_motion(&recording, &options).expect("motion long enough");
+        let found = FoundFormula::of_motion(&recording, &options).expect("motion long enough");
         let seconds = processor_time() - started;
         println!(
             "{name} arm{}, {} runs: {:?}, residual {:.3}, {seconds:.1} s",
@@ -233,7 +233,7 @@ const STATES: usize = 1500;
 
 /// The metric of a network of this structure, trained by the preset `quick`, as a formula, for one seed.
 fn metric(case: &Metric, structure: Structure, seed: u64, show: bool) {
-    let system = configure::<f64>(case.name, &[]).expect("a system of the catalogue");
+    let system = SystemInstance::<f64>::named(case.name, &[]).expect("a system of the catalogue");
     let mut config = Preset::Quick.config_of(&system, structure).expect("every system has a quick preset");
     config.seed = seed;
     let model = train::<f32>(&config, 2, &Hooks::default()).expect("a training").model.cast::<f64>();
@@ -261,7 +261,7 @@ fn metric(case: &Metric, structure: Structure, seed: u64, show: bool) {
         ..FormulaOptions::default()
     };
     let started = processor_time();
-    let found = formula_of_model(&model, (&names, &periodic), (&q, &v), &options).expect("a library");
+    let found = FoundFormula::of_model(&model, (&names, &periodic), (&q, &v), &options).expect("a library");
     let (right, error) = judge(case.truth, &found, false);
     println!(
         "{:24} {} seed {seed}: right {right}, {:?}, constants within {:.3} %, residual {:.4}, {:.1} s",
@@ -337,7 +337,7 @@ mod tests {
         assert!(line(case, how, 1, false, &mut String::new()));
         assert_eq!(case.record(Recorded { force: 1.0, ..how }).tracks[0].force.len(), 76);
         let options = FormulaOptions { threads: 1, ..case.options(0) };
-        assert!(formula_of_motion(&OUTSIDE[0].record(how), &options).is_ok());
+        assert!(FoundFormula::of_motion(&OUTSIDE[0].record(how), &options).is_ok());
         assert_eq!(CLEAN.len() + FRICTION.len() + CART_POLES.coordinates.len(), 13);
     }
 }

@@ -3,12 +3,12 @@
 
 use super::arm::{Faults, JOINTS, Motion, RATE, constants, log, mass_matrix, names, torques};
 use lnn::identification::{IdentifyOptions, identify};
-use lnn::lagrangian::{EulerLagrange, Request, Terms, configure_system, inverse_dynamics};
+use lnn::lagrangian::{EulerLagrange, InverseDynamics, Request, SystemInstance, Terms};
 use lnn::linalg::{Workspace, eigenvalues};
 use lnn::network::Structure;
 use lnn::pipeline::Fit;
 use lnn::pipeline::parse_system;
-use lnn::recording::{Columns, Targets, read_recording};
+use lnn::recording::{Columns, LoadedRecording, Targets};
 use lnn::scalar::Scalar;
 use std::borrow::Cow;
 use std::path::Path;
@@ -31,7 +31,7 @@ fn held_out(seed: u64, seconds: f64) -> [Vec<f64>; 4] {
 
 /// Squared error of the torque of every joint over its variance.
 fn errors(network: &dyn EulerLagrange<f64>, [q, v, a, torque]: &[Vec<f64>; 4]) -> Vec<f64> {
-    let found = inverse_dynamics(network, q, v, a).expect("a finite model").external;
+    let found = InverseDynamics::of(network, q, v, a).expect("a finite model").external;
     let of = |i: usize| {
         let column = || torque.iter().skip(i).step_by(JOINTS);
         let count = column().count() as f64;
@@ -67,7 +67,7 @@ fn rate<S: Scalar>(model: &dyn EulerLagrange<S>, states: usize) -> f64 {
     let [q, v, a] = [0.0, 1.0, 2.0].map(wave);
     let time = |_| {
         let start = Instant::now();
-        inverse_dynamics(model, &q, &v, &a).expect("a finite model");
+        InverseDynamics::of(model, &q, &v, &a).expect("a finite model");
         start.elapsed().as_secs_f64()
     };
     states as f64 / (0..STATES.1).map(time).fold(f64::INFINITY, f64::min)
@@ -145,16 +145,16 @@ pub fn links(seeds: std::ops::Range<u64>, seconds: f64, folder: &Path, states: u
         std::fs::write(&file, before.join("\n")).expect("room for a log");
         let [coords, force] = ["q", "tau"].map(names);
         let columns = Columns { coords, force, time: Some("t".to_string()), ..Columns::default() };
-        let reading = read_recording(&[file], &columns).expect("a log");
+        let reading = LoadedRecording::read(&[file], &columns).expect("a log");
         let system = parse_system(include_str!("../../../examples/systems/seven_joints.toml")).expect("a system");
-        let arm = configure_system::<f64>(Cow::Owned(system.clone()), &[]).expect("defaults");
+        let arm = SystemInstance::<f64>::new(Cow::Owned(system.clone()), &[]).expect("defaults");
         let start = Instant::now();
         let found = identify(&arm, &reading.recording, &IdentifyOptions::default()).expect("forces");
         let seconds_taken = start.elapsed().as_secs_f64();
         let values: Vec<(String, String)> =
             found.constants.iter().map(|c| (c.symbol.clone(), c.value.to_string())).collect();
         let model =
-            configure_system::<f64>(Cow::Owned(system.clone()), &values).expect("values").build().expect("a model");
+            SystemInstance::<f64>::new(Cow::Owned(system.clone()), &values).expect("values").build().expect("a model");
         let unseen = held_out(seed, seconds);
         let (errors, (inertia, least)) = (errors(model.as_ref(), &unseen), inertia(model.as_ref(), &unseen));
         let exact = |name: &str| truth.iter().find(|(known, _)| known == name).map_or(f64::NAN, |(_, x)| *x);
@@ -177,7 +177,7 @@ pub fn links(seeds: std::ops::Range<u64>, seconds: f64, folder: &Path, states: u
             off.len(),
             off.last().copied().unwrap_or(0.0)
         );
-        let single = configure_system::<f32>(Cow::Owned(system), &values).expect("values").build().expect("a model");
+        let single = SystemInstance::<f32>::new(Cow::Owned(system), &values).expect("values").build().expect("a model");
         println!(
             "  {:.0} inverse dynamics a second and core, {:.0} in single precision",
             rate(model.as_ref(), states),

@@ -4,7 +4,7 @@
 use super::{Scale, learned};
 use lnn::analysis::acceleration_errors;
 use lnn::data::{PrepareOptions, RecordingSplit};
-use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms, configure};
+use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
 use lnn::rollout::{RolloutOptions, Trajectory, rollout};
@@ -61,7 +61,7 @@ fn recordings(exact: &dyn EulerLagrange<f64>, count: usize, seed: u64) -> [Recor
 /// Prints and returns rows `seed,learned from,error,seconds`: the mean of `|a - exact|` over that of `|exact|`, on the states
 /// of trajectories that nobody has seen.
 pub fn compare(count: usize, seeds: std::ops::Range<u64>, scale: Scale) -> Vec<String> {
-    let system: SystemInstance<f64> = configure("double-pendulum", &[]).expect("the defaults are valid");
+    let system: SystemInstance<f64> = SystemInstance::named("double-pendulum", &[]).expect("the defaults are valid");
     let exact = system.build().expect("the defaults are valid");
     let mut rows = Vec::new();
     for seed in seeds {

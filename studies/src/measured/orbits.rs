@@ -4,7 +4,7 @@
 
 use super::recorded_orbits::{self, Orbit, distance};
 use lnn::configuration::{Regularizer, Scaling};
-use lnn::lagrangian::{SystemInstance, configure};
+use lnn::lagrangian::SystemInstance;
 use lnn::network::Structure;
 use lnn::pipeline::{Fit, FitConfig};
 use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions, Smoothing, Targets};
@@ -46,7 +46,7 @@ impl Way {
 
     fn system(self) -> SystemInstance<f64> {
         let name = if self == Self::Spherical { "schwarzschild-geodesic" } else { "schwarzschild-cartesian" };
-        configure(name, &[]).expect("the defaults are valid")
+        SystemInstance::named(name, &[]).expect("the defaults are valid")
     }
 
     fn around(self) -> CentralCoordinates {

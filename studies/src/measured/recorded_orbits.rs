@@ -6,7 +6,7 @@
 //! `sqrt(r^3/M)`, and at least once in 1 M.
 
 use lnn::geometry::Sense;
-use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms, configure};
+use lnn::lagrangian::{EulerLagrange, Request, SystemInstance, Terms};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::relativity::{CentralCoordinates, Chart};
 use lnn::rollout::{RolloutOptions, rollout};
@@ -38,7 +38,7 @@ pub struct Orbit {
 
 /// The hole.
 pub fn hole() -> SystemInstance<f64> {
-    configure("schwarzschild-cartesian", &[]).expect("the defaults are valid")
+    SystemInstance::named("schwarzschild-cartesian", &[]).expect("the defaults are valid")
 }
 
 /// Distance from the hole.

@@ -1,7 +1,7 @@
 //! Recorded rows read and surveyed as `lnn check FILE --coords q1,q2` does: seconds, and the memory that it took.
 
 use lnn::random::RngStream;
-use lnn::recording::{Columns, Survey, SurveyOptions, read_recording, survey};
+use lnn::recording::{Columns, LoadedRecording, Survey, SurveyOptions, survey};
 use rand_distr::{Distribution, StandardNormal};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -43,7 +43,7 @@ pub fn time(path: &Path, rows: usize) -> Survey {
     let before = memory();
     let start = Instant::now();
     let columns = Columns { coords: ["q1", "q2"].map(String::from).to_vec(), ..Columns::default() };
-    let reading = read_recording(&[path], &columns).expect("the rows just written");
+    let reading = LoadedRecording::read(&[path], &columns).expect("the rows just written");
     let read = start.elapsed().as_secs_f64();
     let found = survey(&reading, &SurveyOptions::default()).expect("a trajectory long enough");
     let all = start.elapsed().as_secs_f64();

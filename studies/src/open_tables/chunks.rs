@@ -9,7 +9,7 @@
 //! Means over the motions are printed, arithmetic and geometric.
 
 use super::Coordinates;
-use lnn::constraints::{ConstraintSearch, MotionSamples, find_constraints};
+use lnn::constraints::{ConstraintSearch, FoundConstraints, MotionSamples};
 use lnn::data::Dataset;
 use lnn::forward::Dual;
 use lnn::lagrangian::{Constrained, EulerLagrange, ExpressionConstraints, Lagrangian, Mechanics, project};
@@ -457,7 +457,7 @@ fn constraints(chunks: &[States], n: usize, dt: f64) -> Option<Vec<(String, Stri
     let coordinates = (1..=n).map(|i| format!("q{i}")).collect();
     let recording = Recording { coordinates, periodic: vec![false; n], tracks };
     let samples = MotionSamples::exact(&recording).expect("velocities");
-    let found = find_constraints(&samples, ConstraintSearch { degree: 2, velocity_degree: 1 }).ok()?;
+    let found = FoundConstraints::of(&samples, ConstraintSearch { degree: 2, velocity_degree: 1 }).ok()?;
     let of_system = found.constraints.into_iter().filter(|found| found.kind.is_imposed());
     Some(of_system.enumerate().map(|(k, found)| (format!("found {k}"), found.formula)).collect())
 }

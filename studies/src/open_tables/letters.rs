@@ -9,7 +9,7 @@
 
 use lnn::configuration::{Lbfgs, Precision};
 use lnn::data::Dataset;
-use lnn::lagrangian::{EulerLagrange, ForceParts, Lagrangian, Mechanics, force_parts, inverse_dynamics};
+use lnn::lagrangian::{EulerLagrange, ForceParts, InverseDynamics, Lagrangian, Mechanics};
 use lnn::network::{Factor, Structure};
 use lnn::presets::Trainer;
 use lnn::rollout::{Driven, Force, RolloutOptions, Trajectory, rollout};
@@ -80,7 +80,7 @@ impl Motion {
     /// The same states under the torques that the arm says.
     fn under_its_torques(self) -> Self {
         let arm = Mechanics::new(Arm, []);
-        let torque = inverse_dynamics(&arm, &self.q, &self.v, &self.a).expect("smooth forces").generalized;
+        let torque = InverseDynamics::of(&arm, &self.q, &self.v, &self.a).expect("smooth forces").generalized;
         Self { torque, ..self }
     }
 
@@ -151,7 +151,7 @@ fn learned(states: &Motion, seed: u64, (epochs, iterations): (usize, usize)) -> 
 fn torque_errors(model: &dyn EulerLagrange<f64>, test: &Motion) -> [f64; 4] {
     let parts = |model: &dyn EulerLagrange<f64>| {
         let ForceParts { inertial, coriolis, gravity, .. } =
-            force_parts(model, &test.q, &test.v, &test.a).expect("finite forces");
+            ForceParts::of(model, &test.q, &test.v, &test.a).expect("finite forces");
         let whole = inertial.iter().zip(&coriolis).zip(&gravity).map(|((i, c), g)| i + c + g).collect();
         [whole, inertial, coriolis, gravity]
     };
@@ -241,7 +241,7 @@ fn tracking_error(model: Option<&dyn EulerLagrange<f64>>, letter: &Motion) -> f6
             .map(|j| acceleration[j] + 2.0 * pull * (speed[j] - v[j]) + pull * pull * (wanted[j] - q[j]))
             .collect();
         let torque = match model {
-            Some(model) => inverse_dynamics(model, &q, &v, &a).expect("finite forces").generalized,
+            Some(model) => InverseDynamics::of(model, &q, &v, &a).expect("finite forces").generalized,
             None => a,
         };
         let options = RolloutOptions::new(CONTROL_STEP, CONTROL_STEP).energy(false);
@@ -317,7 +317,7 @@ fn rate(model: &dyn EulerLagrange<f64>) -> f64 {
     let states = free_states(&FREE_STARTS.map(free_motion), 0);
     let (started, mut rounds) = (Instant::now(), 0);
     while started.elapsed().as_secs_f64() < 0.5 {
-        inverse_dynamics(model, &states.q, &states.v, &states.a).expect("finite forces");
+        InverseDynamics::of(model, &states.q, &states.v, &states.a).expect("finite forces");
         rounds += 1;
     }
     (rounds * FREE_STATES) as f64 / started.elapsed().as_secs_f64()

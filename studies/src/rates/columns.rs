@@ -2,8 +2,8 @@
 
 use super::formula::Draw;
 use super::{Outcome, Rate};
-use lnn::lagrangian::{SystemInstance, configure, systems};
-use lnn::recording::{Columns, Guess, guess};
+use lnn::lagrangian::{System, SystemInstance};
+use lnn::recording::{Columns, Guess};
 use lnn::rollout::Motion;
 use std::fmt::Write as _;
 
@@ -48,7 +48,7 @@ fn rows(system: &SystemInstance<f64>, velocities: bool, draw: &mut Draw) -> Opti
 
 /// `true` if every column is taken as what it is; none where there is no motion.
 fn is_right(name: &str, written: Written, draw: &mut Draw) -> Outcome<Option<bool>> {
-    let system = configure::<f64>(name, &[])?;
+    let system = SystemInstance::<f64>::named(name, &[])?;
     let n = system.coordinates;
     let Some(rows) = rows(&system, written != Written::Positions, draw) else { return Ok(None) };
     let columns = system.system.columns(n);
@@ -63,7 +63,7 @@ fn is_right(name: &str, written: Written, draw: &mut Draw) -> Outcome<Option<boo
     }
     let file = std::env::temp_dir().join(format!("lnn-columns-{}.csv", std::process::id()));
     std::fs::write(&file, text)?;
-    let guessed = guess(&[&file], &Columns::default());
+    let guessed = Guess::of(&[&file], &Columns::default());
     std::fs::remove_file(&file)?;
     let numbers = |range: std::ops::Range<usize>| range.map(|k| format!("c{}", k + 2)).collect::<Vec<String>>();
     let (coordinates, velocities) = match written {
@@ -92,13 +92,13 @@ pub fn rates(seeds: u64) -> Outcome<Vec<Rate>> {
         ("positions and velocities without names", Written::Unnamed, 0.9),
     ] {
         let (mut said, mut of) = (0, 0);
-        for (case, system) in (0..).zip(systems()) {
+        for (case, system) in (0..).zip(System::all()) {
             let name = system.name.as_ref();
             // A spacetime has its time among its coordinates, and another parameter beside it.
             if system.time_like.is_some() {
                 continue;
             }
-            let small = configure::<f64>(name, &[])?.coordinates <= COORDINATES;
+            let small = SystemInstance::<f64>::named(name, &[])?.coordinates <= COORDINATES;
             for seed in (0..seeds).filter(|_| small) {
                 let Some(right) = is_right(name, written, &mut Draw::of(seed, 60 + case))? else { continue };
                 (said, of) = (said + usize::from(right), of + 1);

@@ -1,7 +1,7 @@
 //! Constraints found in recorded motion: free systems, what is nearly a constraint, and what is one, under white and coloured noise.
 
 use super::{Outcome, Rate};
-use lnn::constraints::{ConstraintKind, ConstraintSearch, FoundConstraints, MotionSamples, find_constraints};
+use lnn::constraints::{ConstraintKind, ConstraintSearch, FoundConstraints, MotionSamples};
 use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -172,7 +172,7 @@ fn recorded(
 
 fn found(recording: &Recording) -> Outcome<FoundConstraints> {
     let samples = MotionSamples::of(recording, &SmoothOptions::default())?;
-    Ok(find_constraints(&samples, ConstraintSearch::default())?)
+    Ok(FoundConstraints::of(&samples, ConstraintSearch::default())?)
 }
 
 /// Whether something is said of `seeds` systems each.

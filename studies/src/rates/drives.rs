@@ -2,7 +2,7 @@
 
 use super::formula::{Draw, Law, is_found, report, step, track};
 use super::{Outcome, Rate};
-use lnn::formula::{FormulaError, FormulaOptions, FoundFormula, FoundTerm, formula_of_motion};
+use lnn::formula::{FormulaError, FormulaOptions, FoundFormula, FoundTerm};
 use lnn::recording::Recording;
 use std::f64::consts::TAU;
 
@@ -68,7 +68,7 @@ impl Driven {
     fn search(&self, seed: u64, draw: &mut Draw) -> Result<FoundFormula, FormulaError> {
         let options =
             FormulaOptions { bootstraps: 4, seed, threads: 2, friction: self.friction, ..FormulaOptions::default() };
-        formula_of_motion(&self.record(draw), &options)
+        FoundFormula::of_motion(&self.record(draw), &options)
     }
 
     /// `true` for its terms, no other, and its frequency within so many standard errors.
@@ -218,7 +218,10 @@ fn noise(seed: u64) -> Result<FoundFormula, FormulaError> {
     let q = times.iter().map(|_| draw.normal()).collect();
     let recording =
         Recording { coordinates: vec!["x".into()], periodic: vec![false], tracks: vec![track(0, times, q)] };
-    formula_of_motion(&recording, &FormulaOptions { bootstraps: 4, seed, threads: 2, ..FormulaOptions::default() })
+    FoundFormula::of_motion(
+        &recording,
+        &FormulaOptions { bootstraps: 4, seed, threads: 2, ..FormulaOptions::default() },
+    )
 }
 
 /// Rates of `seeds` systems a case.

@@ -1,7 +1,7 @@
 //! How often a formula is found where there is none, and missed where there is one.
 
 use super::{Outcome, Rate};
-use lnn::formula::{FormulaError, FormulaOptions, FoundFormula, Verdict, formula_of_motion};
+use lnn::formula::{FormulaError, FormulaOptions, FoundFormula, Verdict};
 use lnn::recording::{RecordedTrajectory, Recording};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -264,7 +264,7 @@ pub(super) fn null(kind: &str, draw: &mut Draw) -> Recording {
 }
 
 fn search(recording: &Recording, seed: u64) -> Found {
-    formula_of_motion(recording, &FormulaOptions { bootstraps: 4, seed, threads: 2, ..FormulaOptions::default() })
+    FoundFormula::of_motion(recording, &FormulaOptions { bootstraps: 4, seed, threads: 2, ..FormulaOptions::default() })
 }
 
 pub(super) fn is_found(found: &Found) -> bool {

@@ -2,7 +2,7 @@
 
 use super::{Outcome, Rate};
 use lnn::identification::{Identified, IdentifyOptions, identify};
-use lnn::lagrangian::{Description, SystemInstance, configure_system};
+use lnn::lagrangian::{Description, SystemInstance};
 use lnn::prelude::Motion;
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording, Targets};
@@ -110,7 +110,7 @@ impl Form {
             "coordinates": coordinates, "parameters": parameters,
         }))?;
         let given: Vec<_> = values.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-        Ok(configure_system(Cow::Owned(description.system()?), &given)?)
+        Ok(SystemInstance::new(Cow::Owned(description.system()?), &given)?)
     }
 
     fn recording(&self, tracks: Vec<RecordedTrajectory>) -> Recording {

@@ -4,7 +4,7 @@
 use super::identify::Tally;
 use super::{Outcome, Rate};
 use lnn::identification::{IdentifyOptions, identify};
-use lnn::lagrangian::{Description, SystemInstance, configure_system};
+use lnn::lagrangian::{Description, SystemInstance};
 use lnn::random::{RandomGenerator, RngStream};
 use lnn::recording::{RecordedTrajectory, Recording};
 use rand::Rng;
@@ -356,7 +356,7 @@ impl Machine {
         let (text, other) = self.wrong;
         let changed = if right { self.system.to_string() } else { self.system.replace(text, other) };
         let description: Description = toml::from_str(&changed)?;
-        Ok(configure_system(Cow::Owned(description.system()?), values)?)
+        Ok(SystemInstance::new(Cow::Owned(description.system()?), values)?)
     }
 
     /// The constants to find with their true values.

@@ -1,12 +1,12 @@
 //! Fits of networks, conserved quantities and Lyapunov times.
 
 use super::{Outcome, Rate};
-use lnn::analysis::lyapunov;
-use lnn::lagrangian::{EulerLagrange, Mechanics, WithForces, build};
+use lnn::analysis::Lyapunov;
+use lnn::lagrangian::{EulerLagrange, Mechanics, SystemInstance, WithForces};
 use lnn::prelude::*;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{RolloutOptions, rollout};
-use lnn::symmetry::{Basis, Chart, Degrees, EXACT, Invariant, Region, quadratic, symmetries};
+use lnn::symmetry::{Basis, Chart, Degrees, Invariant, Quadratic, Region, Symmetries};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -173,8 +173,8 @@ fn said(model: &dyn EulerLagrange<f64>) -> Outcome<(usize, Invariant)> {
     let basis = Basis::new(&names, &charts, Degrees::usual(&charts));
     let region = Region { position: vec![[-1.5, 1.5]; 2], velocity: vec![[-1.0, 1.0]; 2] };
     let (q, v) = region.states(1000, 0, |_, _| true);
-    let found = symmetries(model, &basis, (&q, &v), Some(EXACT))?;
-    let second = quadratic(model, &found.basis, &found.fields, (&q, &v), Some(EXACT))?;
+    let found = Symmetries::find(model, &basis, (&q, &v), Some(Symmetries::EXACT))?;
+    let second = Quadratic::find(model, &found.basis, &found.fields, (&q, &v), Some(Symmetries::EXACT))?;
     let charges = found.conserved.iter().filter(|conserved| **conserved).count();
     Ok((charges + second.conserved.len(), found.invariant))
 }
@@ -221,11 +221,12 @@ fn is_chaotic(
 ) -> Outcome<bool> {
     let state: Vec<f64> = bounds.iter().map(|[low, high]| rng.random_range(*low..*high)).collect();
     let (q, v) = state.split_at(state.len() / 2);
-    Ok(lyapunov(model, q, v, &RolloutOptions::reference(seconds, seconds / 200.0))?.is_chaotic())
+    Ok(Lyapunov::of(model, q, v, &RolloutOptions::reference(seconds, seconds / 200.0))?.is_chaotic())
 }
 
 fn chaotic(seeds: u64) -> Outcome<Vec<Rate>> {
-    let [sphere, pendulum] = ["sphere-geodesic", "double-pendulum"].map(|name| build::<f64>(name, &[]));
+    let [sphere, pendulum] = ["sphere-geodesic", "double-pendulum"]
+        .map(|name| SystemInstance::<f64>::named(name, &[]).and_then(|system| system.build()));
     let (sphere, pendulum) = (sphere?, pendulum?);
     let springs = Mechanics::<_, f64>::new(Linear, vec![]);
     let circles = [[0.2, 2.9], [0.0, 6.0], [-1.5, 1.5], [-1.5, 1.5]];

@@ -10,7 +10,7 @@ use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::error::Error;
-use lnn::lagrangian::{Accelerations, Constrained, Constraints, ExpressionLagrangian, Linearizer, build};
+use lnn::lagrangian::{Accelerations, Constrained, Constraints, ExpressionLagrangian, Linearizer, SystemInstance};
 use lnn::prelude::*;
 use lnn::tape::Function;
 
@@ -131,7 +131,7 @@ pub fn pendula() -> Result<[f64; 2], Box<dyn Error>> {
     let bob = ExpressionLagrangian::new(&["x", "y"], &["m", "g"], "m*(x_dot^2 + y_dot^2)/2 - m*g*y")?;
     let pendulum = Constrained::new(Mechanics::new(bob, [2.0, 9.81]), Rod, [1.0])?;
     let lowest = pendulum.acceleration(&[0.0, -1.0], &[3.0, 0.0])?;
-    let known = build::<f64>("n-pendulum", &[("n".into(), "1".into())])?;
+    let known = SystemInstance::<f64>::named("n-pendulum", &[("n".into(), "1".into())])?.build()?;
     let aside = known.acceleration(&[0.5], &[0.0])?;
     Ok([difference(&lowest, &[0.0, 9.0]), difference(&aside, &[-9.8 * Real::sin(0.5)])])
 }

@@ -7,7 +7,6 @@ use crate::common::properties;
 use lnn::lagrangian::Lagrangian;
 use lnn::network::{
     Activation, ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, Layout, Structure,
-    initial_weights,
 };
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, Recorded, ScalarFunction, gradient};
@@ -254,7 +253,7 @@ fn every_structure_agrees_with_nested_forward_numbers() {
         let architecture = Architecture { hidden: vec![6, 4], ..architecture };
         assert_eq!(architecture.validate(), Ok(()));
         let mut rng = ChaCha8Rng::seed_from_u64(k as u64);
-        let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
+        let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut rng);
         let layout = Layout::new(&architecture);
         assert_eq!(weights.len(), layout.parameters);
         assert_eq!(architecture.model::<f64>().matrices(), layout.matrices().collect::<Vec<_>>());

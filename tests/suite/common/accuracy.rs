@@ -11,7 +11,7 @@ pub fn cast<S: Scalar, T: Scalar>(x: &[S]) -> Vec<T> {
 
 pub fn configure<S: Scalar>(name: &str, given: &[(&str, &str)]) -> SystemInstance<S> {
     let given: Vec<(String, String)> = given.iter().map(|&(s, t)| (s.into(), t.into())).collect();
-    lagrangian::configure(name, &given).unwrap()
+    lagrangian::SystemInstance::named(name, &given).unwrap()
 }
 
 /// The same system, with the same numbers, in another precision.

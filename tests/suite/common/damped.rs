@@ -1,6 +1,6 @@
 //! Motion that loses energy, with friction that is known.
 
-use lnn::lagrangian::{EulerLagrange, GeneralizedForce, WithForces, configure};
+use lnn::lagrangian::{EulerLagrange, GeneralizedForce, SystemInstance, WithForces};
 
 /// A chain of pendula with friction in its joints, viscous and nearly dry.
 pub type Damped = WithForces<Box<dyn EulerLagrange<f64>>, Joints>;
@@ -33,6 +33,6 @@ impl GeneralizedForce<f64> for Joints {
 
 /// `n` damped pendula of 1 m and 1 kg in the Earth's gravity.
 pub fn chain(n: usize) -> Damped {
-    let configured = configure("n-pendulum", &[("n".to_string(), n.to_string())]).unwrap();
+    let configured = SystemInstance::named("n-pendulum", &[("n".to_string(), n.to_string())]).unwrap();
     WithForces::new(configured.build().unwrap(), Joints)
 }

@@ -2,7 +2,7 @@
 #![allow(dead_code, reason = "each program uses its part")]
 
 use lnn::identification::{Identified, IdentifyOptions, identify};
-use lnn::lagrangian::{Description, SystemInstance, configure_system};
+use lnn::lagrangian::{Description, SystemInstance};
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
 use lnn::rollout::{Driven, RolloutOptions};
@@ -146,7 +146,7 @@ fn instance(form: &Form, values: &BTreeMap<String, f64>) -> Outcome<SystemInstan
     );
     let description: Description = serde_json::from_str(&text)?;
     let given: Vec<(String, String)> = values.iter().map(|(name, x)| (name.clone(), x.to_string())).collect();
-    Ok(configure_system(Cow::Owned(description.system()?), &given)?)
+    Ok(SystemInstance::new(Cow::Owned(description.system()?), &given)?)
 }
 
 impl Trial {

@@ -4,7 +4,7 @@ use lnn::lagrangian::Description;
 use lnn::network::{
     ActivationChoice, Architecture, Factor, Form, InputLayer, JointFriction, Layout, Radial, Sizes, Structure,
 };
-use lnn::network::{FORMAT, Header, ModelFile, StoredPrecision};
+use lnn::network::{Header, ModelFile, StoredPrecision};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -56,7 +56,7 @@ fn black_box() -> Header {
         form,
     };
     Header {
-        format: FORMAT,
+        format: Header::FORMAT,
         crate_version: env!("CARGO_PKG_VERSION").to_string(),
         architecture,
         system: "recorded".to_string(),

@@ -1,7 +1,7 @@
 //! Penalties against exact mass matrices.
 
 use lnn::configuration::{Config, Penalty};
-use lnn::data::sample_all;
+use lnn::data::Datasets;
 use lnn::lagrangian::{Request, Terms};
 use lnn::linalg::{SignatureBuffers, has_signature};
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ pub fn allow_the_truth(configs: impl Iterator<Item = Config>) -> usize {
             Penalty::Sylvester { time, .. } => time,
             _ => None,
         };
-        let (data, _) = sample_all::<f64>(config, &system).unwrap();
+        let (data, _) = Datasets::<f64>::sample(config, &system).unwrap();
         let (mut terms, mut buffers, n) = (Terms::default(), SignatureBuffers::default(), system.coordinates);
         for set in &data.training {
             system.build().unwrap().terms(set.q(), set.v(), Request::MASS_MATRIX, &mut terms).unwrap();

@@ -2,7 +2,7 @@
 
 use super::spaces::{SPACES, Space, dd};
 use crate::common::accuracy::configure;
-use lnn::geometry::{Geometry, geometries};
+use lnn::geometry::Geometry;
 use lnn::scalar::{Dd, Real, Scalar};
 
 fn largest<S: Scalar>(x: &[S]) -> f64 {
@@ -191,10 +191,10 @@ fn the_metric_is_the_mass_matrix_as_it_is() {
         ("sphere-geodesic", vec![1.0, 2.0], 2.0),
     ] {
         let model = configure::<f64>(name, &[]).build().unwrap();
-        let found = geometries(&*model, &q, &vec![0.0; q.len()]).unwrap().remove(0).unwrap();
+        let found = Geometry::of(&*model, &q, &vec![0.0; q.len()]).unwrap().remove(0).unwrap();
         assert!((found.curvature.scalar / exact - 1.0).abs() < 1e-14, "{name}: {}", found.curvature.scalar);
     }
     let heavy = configure::<f64>("sphere-geodesic", &[("m", "4"), ("R", "0.5")]).build().unwrap();
-    let found = geometries(&*heavy, &[1.0, 2.0], &[0.0; 2]).unwrap().remove(0).unwrap();
+    let found = Geometry::of(&*heavy, &[1.0, 2.0], &[0.0; 2]).unwrap().remove(0).unwrap();
     assert!((found.curvature.scalar - 2.0).abs() < 1e-14 && found.metric.components[0] == 1.0);
 }

@@ -4,7 +4,7 @@
 use super::spaces::dd;
 use crate::common::properties;
 use lnn::forward::HyperDual;
-use lnn::geometry::{Geometry, geometries};
+use lnn::geometry::Geometry;
 use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, MechanicsError, Request, Terms};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::VectorFunction;
@@ -58,7 +58,7 @@ fn point<S: Scalar>(n: usize, seed: f64) -> Vec<S> {
 
 fn at(random: &Random, q: &[Dd]) -> Geometry<Dd> {
     let model = Mechanics::new(random.clone(), Vec::new());
-    geometries(&model, q, &vec![dd(0.0); q.len()]).unwrap().remove(0).unwrap()
+    Geometry::of(&model, q, &vec![dd(0.0); q.len()]).unwrap().remove(0).unwrap()
 }
 
 /// Central difference of order 6 of several numbers along coordinate `k`, good to about 1e-20.
@@ -221,7 +221,7 @@ fn a_constant_field_has_no_covariant_derivative() {
         }
     }
     let q = [1.5, 0.7];
-    let found = geometries(&Mechanics::new(Plane, Vec::new()), &q, &[0.0; 2]).unwrap().remove(0).unwrap();
+    let found = Geometry::of(&Mechanics::new(Plane, Vec::new()), &q, &[0.0; 2]).unwrap().remove(0).unwrap();
     let derivative = found.connection.covariant_derivative_of(&Eastward, &q).unwrap();
     assert!(derivative.iter().all(|x: &f64| x.abs() < 1e-15), "{derivative:?}");
     // Along the angle the plain components do change.
@@ -263,7 +263,7 @@ fn velocities_and_branches() {
     }
     let free = Mechanics::new(Free, Vec::new());
     for (v, exact) in [(0.0, 1.0), (0.6, 0.8f64.powi(-3))] {
-        let found = geometries(&free, &[0.0], &[v]).unwrap().remove(0).unwrap();
+        let found = Geometry::of(&free, &[0.0], &[v]).unwrap().remove(0).unwrap();
         assert!((found.metric.components[0] - exact).abs() < 1e-15);
     }
     struct Branch;

@@ -1,7 +1,7 @@
 //! The geometry of networks: jets of their mass matrix against differences of it in double-double.
 
 use super::spaces::dd;
-use lnn::geometry::geometries;
+use lnn::geometry::Geometry;
 use lnn::lagrangian::{EulerLagrange, Request, Terms};
 use lnn::network::{ActivationChoice, Architecture, Form, InputLayer, Layout, NetworkLagrangian, Structure};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -83,17 +83,17 @@ fn jets_are_derivatives_of_the_mass_matrix() {
 fn precisions_and_batches_agree() {
     let model = network(ActivationChoice::Gelu, Structure::Metric, false);
     let points = [0.3, 0.5, -0.2, 1.1, 2.0, 0.4];
-    let both = geometries(&model, &points, &[0.0; 3]).unwrap();
+    let both = Geometry::of(&model, &points, &[0.0; 3]).unwrap();
     for (k, found) in both.into_iter().enumerate() {
         let (q, found) = (&points[3 * k..3 * k + 3], found.unwrap());
-        assert_eq!(found, geometries(&model, q, &[0.0; 3]).unwrap().remove(0).unwrap());
+        assert_eq!(found, Geometry::of(&model, q, &[0.0; 3]).unwrap().remove(0).unwrap());
         assert_eq!((found.metric.signature.negative, found.metric.signature.positive), (1, 2));
         let wide =
-            geometries(&model.cast::<Dd>(), &[q[0], q[1], q[2]].map(dd), &[dd(0.0); 3]).unwrap().remove(0).unwrap();
+            Geometry::of(&model.cast::<Dd>(), &[q[0], q[1], q[2]].map(dd), &[dd(0.0); 3]).unwrap().remove(0).unwrap();
         let size = wide.curvature.riemann.iter().fold(0f64, |m, x| m.max(x.to_f64().abs()));
         assert!((found.curvature.scalar - wide.curvature.scalar.to_f64()).abs() < 1e-11 * size);
         let single = [q[0], q[1], q[2]].map(|x| x as f32);
-        let single = geometries(&model.cast::<f32>(), &single, &[0f32; 3]).unwrap().remove(0).unwrap();
+        let single = Geometry::of(&model.cast::<f32>(), &single, &[0f32; 3]).unwrap().remove(0).unwrap();
         assert!((f64::from(single.curvature.scalar) - wide.curvature.scalar.to_f64()).abs() < 1e-2 * size);
     }
 }

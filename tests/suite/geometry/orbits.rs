@@ -1,7 +1,7 @@
 //! Circular orbits, light, horizons and ergosurfaces of exact black holes, in every chart, against closed forms.
 
 use lnn::geometry::{Equator, Sense, Turn};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::scalar::{Dd, Scalar};
 
 fn given(list: &[(&str, &str)]) -> Vec<(String, String)> {
@@ -24,8 +24,8 @@ fn orbits_of_kerr_are_the_closed_forms_in_both_charts() {
     for spin in ["0.3", "0.9", "0.99"] {
         let a: f64 = spin.parse().unwrap();
         let outer = 1.0 + (1.0 - a * a).sqrt();
-        let sky = configure::<f64>("kerr-geodesic", &given(&[("a", spin)])).unwrap().build().unwrap();
-        let flat = configure::<f64>("kerr-cartesian", &given(&[("a", spin)])).unwrap().build().unwrap();
+        let sky = SystemInstance::<f64>::named("kerr-geodesic", &given(&[("a", spin)])).unwrap().build().unwrap();
+        let flat = SystemInstance::<f64>::named("kerr-cartesian", &given(&[("a", spin)])).unwrap().build().unwrap();
         let polar = [0.0, 0.0, std::f64::consts::FRAC_PI_2, 0.7];
         let charts = [
             (Equator { model: &*sky, time: 0, radius: 1, turn: Turn::Angle(3), point: &polar }, 0.0),
@@ -59,7 +59,7 @@ fn orbits_of_kerr_are_the_closed_forms_in_both_charts() {
 }
 
 fn schwarzschild<S: Scalar>(tolerance: f64) {
-    let flat = configure::<S>("schwarzschild-cartesian", &[]).unwrap().build().unwrap();
+    let flat = SystemInstance::<S>::named("schwarzschild-cartesian", &[]).unwrap().build().unwrap();
     let point = vec![S::of_f64(0.0); 4];
     let equator = Equator { model: &*flat, time: 0, radius: 1, turn: Turn::Across(2), point: &point };
     let range = (S::of_f64(1.2), S::of_f64(30.0));
@@ -85,7 +85,8 @@ fn orbits_of_schwarzschild_are_found_in_every_precision() {
 
 #[test]
 fn a_charge_draws_light_inward_and_flat_space_has_no_orbits() {
-    let hole = configure::<f64>("reissner-nordstrom-cartesian", &given(&[("Q", "0.8")])).unwrap().build().unwrap();
+    let hole =
+        SystemInstance::<f64>::named("reissner-nordstrom-cartesian", &given(&[("Q", "0.8")])).unwrap().build().unwrap();
     let equator = Equator { model: &*hole, time: 0, radius: 1, turn: Turn::Across(2), point: &[0.0; 4] };
     let light = equator.light((1.0, 30.0), Sense::Forward).unwrap().unwrap().radius;
     // r = (3 M + sqrt(9 M^2 - 8 Q^2))/2

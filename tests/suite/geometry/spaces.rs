@@ -1,7 +1,7 @@
 //! Spaces whose curvature is known, as text files, with their invariants written down.
 
-use lnn::geometry::{Geometry, geometries};
-use lnn::lagrangian::{EulerLagrange, configure_system};
+use lnn::geometry::Geometry;
+use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::pipeline::parse_system;
 use lnn::scalar::{Dd, Real, Scalar};
 use std::borrow::Cow;
@@ -43,13 +43,13 @@ impl Space {
 
     pub fn model<S: Scalar>(&self) -> Box<dyn EulerLagrange<S>> {
         let system = parse_system(&self.file()).unwrap_or_else(|error| panic!("{}: {error:?}", self.name));
-        configure_system(Cow::Owned(system), &[]).unwrap().build().unwrap()
+        SystemInstance::new(Cow::Owned(system), &[]).unwrap().build().unwrap()
     }
 
     pub fn at<S: Scalar>(&self, q: &[f64]) -> Geometry<S> {
         let q: Vec<S> = q.iter().map(|&x| S::of_f64(x)).collect();
         let rest = vec![S::of_f64(0.0); q.len()];
-        geometries(&*self.model::<S>(), &q, &rest).unwrap().remove(0).unwrap()
+        Geometry::of(&*self.model::<S>(), &q, &rest).unwrap().remove(0).unwrap()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::spaces::{SPACES, Space, dd};
 use crate::common::accuracy::configure;
-use lnn::geometry::{Change, GeometryError, Metric, characters, geometries, grid, surfaces};
+use lnn::geometry::{Change, Geometry, GeometryError, Metric, Surface, characters, grid};
 use lnn::linalg::Inertia;
 use lnn::scalar::{Dd, Real, Scalar};
 
@@ -16,7 +16,7 @@ fn kerrs_horizons_and_ergosurfaces_are_found() {
     let (theta, a) = (0.75, dd(0.5));
     let line = |r: f64| [0.0, r, theta, 0.0].map(dd);
     let radii = |block: &[usize]| -> Vec<Dd> {
-        let found = surfaces(&*kerr, block, (&line(0.01), &line(5.0)), &[dd(0.0); 4], 97).unwrap();
+        let found = Surface::find(&*kerr, block, (&line(0.01), &line(5.0)), &[dd(0.0); 4], 97).unwrap();
         assert!(found.iter().all(|surface| surface.change == Change::Zero));
         found.iter().map(|surface| surface.point[1]).collect()
     };
@@ -29,7 +29,7 @@ fn kerrs_horizons_and_ergosurfaces_are_found() {
             assert!((found - exact).abs().to_f64() < 1e-29, "{found} {exact}");
         }
     }
-    let poles = surfaces(&*kerr, &[1], (&line(0.01), &line(5.0)), &[dd(0.0); 4], 97).unwrap();
+    let poles = Surface::find(&*kerr, &[1], (&line(0.01), &line(5.0)), &[dd(0.0); 4], 97).unwrap();
     assert!(poles.len() == 2 && poles.iter().all(|surface| surface.change == Change::Pole), "{poles:?}");
 }
 
@@ -47,17 +47,17 @@ fn the_character_of_a_black_hole_changes_at_its_horizon() {
     let none = characters(&*hole, &[0.0, 2.0, 1.0, 0.0], &[0.0; 4]).unwrap();
     assert!(none[0].signature.is_none() && none[0].determinant.is_nan());
     let ends = ([0.0, 1.0, 1.0, 0.0], [0.0, 4.0, 1.0, 0.0]);
-    let found = surfaces(&*hole, &[0], (&ends.0, &ends.1), &[0.0; 4], 7).unwrap();
+    let found = Surface::find(&*hole, &[0], (&ends.0, &ends.1), &[0.0; 4], 7).unwrap();
     assert!(found.len() == 1 && (found[0].point[1] - 2.0).abs() < 1e-15);
     // Metrics are held in pieces of 1024; one of these pieces ends on the horizon, where there is no metric, one beside it.
     for steps in [3 * 1024, 2 * 1024 - 1, 3 * 1023, 5000] {
-        let found = surfaces(&*hole, &[0], (&ends.0, &ends.1), &[0.0; 4], steps).unwrap();
+        let found = Surface::find(&*hole, &[0], (&ends.0, &ends.1), &[0.0; 4], steps).unwrap();
         assert!(found.len() == 1 && (found[0].point[1] - 2.0).abs() < 1e-15, "{steps}: {found:?}");
     }
     // The signature is the same on both sides.
-    assert!(surfaces(&*hole, &[0, 1, 2, 3], (&ends.0, &ends.1), &[0.0; 4], 7).unwrap().is_empty());
+    assert!(Surface::find(&*hole, &[0, 1, 2, 3], (&ends.0, &ends.1), &[0.0; 4], 7).unwrap().is_empty());
     for block in [&[][..], &[4]] {
-        let refused = surfaces(&*hole, block, (&ends.0, &ends.1), &[0.0; 4], 7);
+        let refused = Surface::find(&*hole, block, (&ends.0, &ends.1), &[0.0; 4], 7);
         assert!(matches!(refused, Err(GeometryError::Shape { what: "block of the metric", .. })));
     }
 }
@@ -72,6 +72,6 @@ fn degenerate_metrics_are_errors() {
     assert!(matches!(Metric::new(1, &[f64::NAN]), Err(GeometryError::NotFinite { .. })));
     assert!(matches!(Metric::new(2, &[1.0]), Err(GeometryError::Shape { .. })));
     let sphere = configure::<f64>("sphere-geodesic", &[]).build().unwrap();
-    let found = geometries(&*sphere, &[0.0, 0.0, 1.0, 0.0], &[0.0; 2]).unwrap();
+    let found = Geometry::of(&*sphere, &[0.0, 0.0, 1.0, 0.0], &[0.0; 2]).unwrap();
     assert!(matches!(found[0], Err(GeometryError::Degenerate { .. })) && found[1].is_ok());
 }

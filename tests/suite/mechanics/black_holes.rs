@@ -1,7 +1,7 @@
 //! Black holes in several charts: the same metric, the same constants of motion, Carter's among them.
 
 use lnn::lagrangian::systems::{KerrGeodesic, KerrSchild};
-use lnn::lagrangian::{Request, Terms, configure};
+use lnn::lagrangian::{Request, SystemInstance, Terms};
 use lnn::rollout::{RolloutOptions, rollout};
 use lnn::scalar::{Dd, Real, Scalar};
 use rand::{Rng, SeedableRng};
@@ -34,8 +34,8 @@ fn both_charts_of_kerr_have_one_metric_and_the_same_constants() {
     let mut rng = ChaCha8Rng::seed_from_u64(71);
     for (mass, spin) in [("1", "0.9"), ("1.5", "-0.7"), ("2", "0")] {
         let list = given(&[("M", mass), ("a", spin)]);
-        let polar = configure::<Dd>("kerr-geodesic", &list).unwrap();
-        let flat = configure::<Dd>("kerr-cartesian", &list).unwrap();
+        let polar = SystemInstance::<Dd>::named("kerr-geodesic", &list).unwrap();
+        let flat = SystemInstance::<Dd>::named("kerr-cartesian", &list).unwrap();
         let (m, a) = (polar.parameters[0], polar.parameters[1]);
         for _ in 0..50 {
             let mut draw = |low: f64, high: f64| dd(rng.random_range(low..high));
@@ -76,7 +76,10 @@ fn without_spin_and_charge_all_holes_are_schwarzschilds() {
         ("reissner-nordstrom-cartesian", [("Q", "0")], "schwarzschild-cartesian"),
     ];
     for (name, list, plain) in pairs {
-        let (hole, plain) = (configure::<Dd>(name, &given(&list)).unwrap(), configure::<Dd>(plain, &[]).unwrap());
+        let (hole, plain) = (
+            SystemInstance::<Dd>::named(name, &given(&list)).unwrap(),
+            SystemInstance::<Dd>::named(plain, &[]).unwrap(),
+        );
         let bounds = plain.system.validation(4);
         for _ in 0..20 {
             let mut draw = |bounds: &[(f64, f64)]| -> Vec<Dd> {
@@ -97,7 +100,7 @@ fn without_spin_and_charge_all_holes_are_schwarzschilds() {
 /// `g = eta + f l l` of a place on the equator, a tilted one, and through the horizon: what the tensor says there.
 #[test]
 fn free_fall_passes_the_horizon() {
-    let system = configure::<f64>("schwarzschild-cartesian", &[]).unwrap();
+    let system = SystemInstance::<f64>::named("schwarzschild-cartesian", &[]).unwrap();
     let exact = system.build().unwrap();
     let q = [0.0, 2.4, 3.2, 3.0];
     let mut v = [0.0, 0.0, 0.0, 0.0];

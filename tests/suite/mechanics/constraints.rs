@@ -4,7 +4,7 @@ use lnn::forward::{Dual, HyperDual};
 use lnn::lagrangian::{
     Constrained, ConstraintError, Constraints, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, Lagrangian,
     LeastNorm, ManifoldRows, Mechanics, MechanicsError, ReducedMass, Request, SystemInstance, Terms, WithForces,
-    configure, constrained_systems, project,
+    constrained_systems, project,
 };
 use lnn::scalar::{Dd, Real, Scalar};
 
@@ -47,7 +47,7 @@ fn cast<S: Scalar>(x: &[f64]) -> Vec<S> {
 
 /// Acceleration in Cartesian coordinates by the constraints, and by the generalized coordinates.
 fn both<S: Scalar, E: Embedding>(name: &str, embedding: E, q: &[f64], v: &[f64]) -> [Vec<S>; 2] {
-    let system = configure::<S>(name, &[]).unwrap();
+    let system = SystemInstance::<S>::named(name, &[]).unwrap();
     let (q, v): (Vec<S>, Vec<S>) = (cast(q), cast(v));
     let cartesian = free_lagrangian(&system);
     let generalized = Mechanics::new(Pulled { embedding, free: q.len(), cartesian }, system.parameters.clone());
@@ -213,7 +213,7 @@ fn motion_is_that_of_generalized_coordinates() {
 #[test]
 fn wheels_and_blades_move_as_their_closed_forms() {
     // The sleigh: u' = a w^2, w' = -m a u w / (I + m a^2).
-    let model = configure::<f64>("chaplygin-sleigh", &[]).unwrap().build().unwrap();
+    let model = SystemInstance::<f64>::named("chaplygin-sleigh", &[]).unwrap().build().unwrap();
     let (theta, u, w) = (0.8f64, 1.7, -1.1);
     let (a, m, i) = (0.3, 1.0, 0.2);
     let (s, c) = theta.sin_cos();
@@ -223,7 +223,7 @@ fn wheels_and_blades_move_as_their_closed_forms() {
         assert!((found - exact).abs() < 1e-14, "{found} {exact}");
     }
     // The disk: rates of heading and rolling stay, the centre runs on a circle.
-    let model = configure::<f64>("rolling-disk", &[]).unwrap().build().unwrap();
+    let model = SystemInstance::<f64>::named("rolling-disk", &[]).unwrap().build().unwrap();
     let (turn, roll, r) = (0.9, 2.3, 0.5);
     let found = model.acceleration(&[0.1, 0.2, theta, 0.3], &[r * roll * c, r * roll * s, turn, roll]).unwrap();
     for (found, exact) in found.iter().zip([-r * roll * turn * s, r * roll * turn * c, 0.0, 0.0]) {
@@ -238,9 +238,9 @@ fn geodesics_by_a_clock_are_those_by_proper_time() {
         ("schwarzschild-by-clock", "schwarzschild-geodesic", [0.3, 7.0, 1.2, 0.4], [1.0, 0.1, 0.02, -0.03]),
         ("ads4-by-clock", "ads4-geodesic", [0.3, 0.5, -0.2, 1.4], [1.0, 0.1, 0.3, -0.2]),
     ] {
-        let system = configure::<f64>(clock, &[]).unwrap();
+        let system = SystemInstance::<f64>::named(clock, &[]).unwrap();
         let found = system.build().unwrap().acceleration(&q, &v).unwrap();
-        let geodesic = configure::<f64>(proper, &[]).unwrap();
+        let geodesic = SystemInstance::<f64>::named(proper, &[]).unwrap();
         // Proportional to (1, dx/dt) on the mass shell, g(v, v) = 2 L = -1.
         let metric = geodesic.build().unwrap();
         let mut terms = Terms::default();
@@ -270,7 +270,7 @@ fn geodesics_by_a_clock_are_those_by_proper_time() {
 
 #[test]
 fn batches_and_forces_are_those_of_single_states() {
-    let system = configure::<f64>("cartesian-chain-2", &[]).unwrap();
+    let system = SystemInstance::<f64>::named("cartesian-chain-2", &[]).unwrap();
     let model = system.build().unwrap();
     let angles = [[0.3, 1.0, -0.4, 2.0], [2.0, -1.0, 1.0, 0.5], [0.0, 0.1, -2.0, 0.3]];
     let (mut q, mut v) = (vec![], vec![]);
@@ -394,7 +394,7 @@ fn the_least_motion_is_found_where_nothing_tells_it() {
 
 #[test]
 fn states_are_brought_to_the_constraints_by_the_shortest_way() {
-    let model = configure::<f64>("particle-on-sphere", &[]).unwrap().build().unwrap();
+    let model = SystemInstance::<f64>::named("particle-on-sphere", &[]).unwrap().build().unwrap();
     let (mut q, mut v) = ([0.0, 0.0, 1.001], [0.3, 0.0, 0.1]);
     let moved = project(model.manifold().unwrap(), &mut q, &mut v).unwrap();
     assert!((moved[0] - 0.001).abs() < 1e-12 && (moved[1] - 0.1).abs() < 1e-12, "{moved:?}");
@@ -408,7 +408,7 @@ fn the_catalogue_is_whole() {
     assert_eq!(constrained_systems().len(), 31);
     for system in constrained_systems() {
         let n = system.size.default();
-        let model = configure::<f64>(&system.name, &[]).unwrap().build().unwrap();
+        let model = SystemInstance::<f64>::named(&system.name, &[]).unwrap().build().unwrap();
         let manifold = model.manifold().unwrap();
         assert!(manifold.redundant().is_empty() && manifold.names().len() < n, "{}", system.name);
         assert!(model.metric_jets(&vec![0.5; n], &vec![0.0; n]).is_err());

@@ -1,7 +1,7 @@
 //! Systems described in text: their numbers against the catalogue's closed forms, and what is wrong in a description.
 
 use crate::common::accuracy::{cast, configure, input_conditions, largest, outputs, random_state, recast};
-use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Request, SystemInstance, Terms, configure_system};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Request, SystemInstance, Terms};
 use lnn::linalg::{self, Workspace};
 use lnn::network::Structure;
 use lnn::pipeline::parse_system;
@@ -20,7 +20,7 @@ const KERR: &str = include_str!("../../../examples/systems/kerr.toml");
 
 fn described<S: Scalar>(text: &str, given: &[(&str, &str)]) -> SystemInstance<S> {
     let given: Vec<(String, String)> = given.iter().map(|&(s, t)| (s.into(), t.into())).collect();
-    configure_system(Cow::Owned(parse_system(text).unwrap()), &given).unwrap()
+    SystemInstance::new(Cow::Owned(parse_system(text).unwrap()), &given).unwrap()
 }
 
 /// Outputs of a described system against those of the catalogue's in double-double, its acceleration against the closed

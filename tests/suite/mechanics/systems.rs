@@ -97,7 +97,8 @@ fn double_double_agrees_with_an_independent_table() {
             let given: Vec<(String, String)> =
                 field[3].split(' ').filter_map(|p| p.split_once('=')).map(|(s, t)| (s.into(), t.into())).collect();
             // Parameters are binary fractions: the same in every precision.
-            let system: SystemInstance<Dd> = recast(&lagrangian::configure::<f64>(field[2], &given).unwrap());
+            let system: SystemInstance<Dd> =
+                recast(&lagrangian::SystemInstance::<f64>::named(field[2], &given).unwrap());
             let (q, v) = (numbers(field[4]), numbers(field[5]));
             current = outputs(&*system.build().unwrap(), &q, &v);
             exact = system.exact_acceleration(&q, &v).unwrap();
@@ -129,7 +130,7 @@ fn double_double_agrees_with_an_independent_table() {
 /// The acceleration of every system by Euler-Lagrange and by its closed form, within the rounding of `S` times the
 /// condition of the acceleration and of `M`.
 fn closed_forms_agree<S: Scalar>(rng: &mut ChaCha8Rng) {
-    for system in lagrangian::systems() {
+    for system in lagrangian::System::all() {
         // Of a size that is chosen, all with up to twelve coordinates.
         for chosen in match system.size {
             lagrangian::Size::Fixed(n) => n..=n,
@@ -178,7 +179,7 @@ fn closed_forms_agree_in_every_precision() {
 #[test]
 fn batches_replayed_agree_with_single_states_and_requests_with_each_other() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
-    for system in lagrangian::systems() {
+    for system in lagrangian::System::all() {
         let n = system.size.default();
         let configured = configure::<f64>(&system.name, &[]);
         let built = configured.build().unwrap();
@@ -224,7 +225,7 @@ fn batches_replayed_agree_with_single_states_and_requests_with_each_other() {
 
 #[test]
 fn failures_name_the_row_and_leave_the_others() {
-    let spring = lagrangian::build::<f64>("spring-pendulum", &[]).unwrap();
+    let spring = lagrangian::SystemInstance::<f64>::named("spring-pendulum", &[]).unwrap().build().unwrap();
     let mut terms = Terms::default();
     let (q, v) = ([1.0, 0.5, 0.0, 0.5, 2.0, f64::NAN], [0.0; 6]);
     let error = spring.terms(&q, &v, Request::ALL, &mut terms).unwrap_err();
@@ -241,8 +242,10 @@ fn failures_name_the_row_and_leave_the_others() {
     for k in 1..200 {
         let r = 2f64.powi(-k);
         spring.terms(&[r, 0.5], &[1.0, 0.25], Request::ACCELERATION, &mut terms).unwrap();
-        let exact =
-            lagrangian::configure("spring-pendulum", &[]).unwrap().exact_acceleration(&[r, 0.5], &[1.0, 0.25]).unwrap();
+        let exact = lagrangian::SystemInstance::named("spring-pendulum", &[])
+            .unwrap()
+            .exact_acceleration(&[r, 0.5], &[1.0, 0.25])
+            .unwrap();
         for (a, b) in terms.acceleration.iter().zip(exact) {
             assert!((a - b).abs() <= 1e-14 * b.abs(), "r = 2^-{k}: {a} {b}");
         }

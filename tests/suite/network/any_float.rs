@@ -3,10 +3,8 @@
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::lagrangian::systems::DoublePendulum;
-use lnn::lagrangian::{EulerLagrange, Mechanics, Request, Terms, configure};
-use lnn::network::{
-    Activation, ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, initial_weights,
-};
+use lnn::lagrangian::{EulerLagrange, Mechanics, Request, SystemInstance, Terms};
+use lnn::network::{Activation, ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian};
 use lnn::rollout::{Integrator, RolloutOptions, rollout_fixed};
 use lnn::scalar::{AnyFloat, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
@@ -29,7 +27,7 @@ fn floats<S: Scalar>(x: &[S]) -> Vec<f64> {
 }
 
 fn double_pendulum<S: Scalar>() -> Mechanics<DoublePendulum, S> {
-    Mechanics::new(DoublePendulum, configure("double-pendulum", &[]).unwrap().parameters)
+    Mechanics::new(DoublePendulum, SystemInstance::named("double-pendulum", &[]).unwrap().parameters)
 }
 
 /// Accelerations of any model.
@@ -69,7 +67,7 @@ fn network<S: Scalar>(activation: ActivationChoice) -> Results {
     };
     let rng = || ChaCha8Rng::seed_from_u64(7);
     let weights: Vec<S> =
-        initial_weights::<f64>(&architecture, Initialization::Default, &mut rng()).into_iter().map(S::of_f64).collect();
+        architecture.initial_weights::<f64>(Initialization::Default, &mut rng()).into_iter().map(S::of_f64).collect();
     let mut chunk = Evaluation::new(architecture.model::<S>().lagrangian().clone());
     chunk.evaluate(&weights, &numbers::<S>(&Q), &numbers::<S>(&V), Depth::Training);
     let directions = MixedDirections { s: numbers::<S>(&V), t: numbers::<S>(&Q), moving: true };

@@ -3,9 +3,7 @@
 use crate::common::accuracy::cast;
 use crate::common::nested::reference;
 use crate::common::{of_scalar, properties};
-use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, LinearMap, initial_weights,
-};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, LinearMap};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::tape::{Depth, Evaluation, MixedDirections, ScalarFunction, gradient};
 use proptest::prelude::*;
@@ -51,7 +49,7 @@ impl std::fmt::Debug for Case {
 /// Random weights and states of a case; the parameters of an input layer leave their initial values too.
 fn draw<S: Scalar>(case: &Case, batch: usize) -> (Vec<S>, Vec<S>, Vec<S>) {
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
-    let mut weights: Vec<S> = initial_weights(&case.architecture, Initialization::Default, &mut rng);
+    let mut weights: Vec<S> = case.architecture.initial_weights(Initialization::Default, &mut rng);
     for layer in Layout::new(&case.architecture).branches.iter().flat_map(|branch| &branch.layers) {
         if layer.map != LinearMap::Dense {
             for k in layer.weight_range().chain(layer.bias_range()) {

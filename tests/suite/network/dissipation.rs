@@ -11,7 +11,7 @@ use lnn::lagrangian::{Description, EulerLagrange, Request, Terms};
 use lnn::linalg::Workspace;
 use lnn::network::{
     ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, JointFriction, Layout, NetworkLagrangian,
-    Structure, initial_weights,
+    Structure,
 };
 use lnn::optimizers::{Method, Schedule};
 use lnn::rollout::{Integrator, RolloutError, RolloutOptions, rollout, rollout_fixed, rollout_together};
@@ -78,7 +78,7 @@ impl Case {
     /// states, angles in `[0, 2 pi)`.
     fn draw<S: Scalar>(&self, batch: usize, driest: f64) -> (Vec<S>, Vec<S>, Vec<S>) {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
-        let mut weights: Vec<S> = initial_weights(&self.architecture, Initialization::Default, &mut rng);
+        let mut weights: Vec<S> = self.architecture.initial_weights(Initialization::Default, &mut rng);
         let layout = Layout::new(&self.architecture).dissipation.unwrap();
         let length = 10f64.powf(rng.random_range(-2.0..driest));
         for k in layout.gamma_range().chain(layout.weight_range()) {

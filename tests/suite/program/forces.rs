@@ -3,9 +3,9 @@
 use crate::running::{Folder, Run, lnn, model, text};
 use lnn::configuration::Penalty;
 use lnn::data::{PrepareOptions, RecordingSplit};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::network::ModelFile;
-use lnn::recording::{Columns, read_recording};
+use lnn::recording::{Columns, LoadedRecording};
 use lnn::rollout::{Driven, RolloutOptions, SampledForce};
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
@@ -36,7 +36,7 @@ const HEADER: &str = "run,t,upper,lower,upper_dot,lower_dot,upper_ddot,lower_ddo
 /// Runs of two seconds of a double pendulum driven by torques of a few N m, linear between the samples; every line of a run.
 fn runs(count: usize) -> Vec<Vec<String>> {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    let arm = configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
+    let arm = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
     (0..count)
         .map(|run| {
             let times: Vec<f64> = (0..=(2.0 * RATE) as usize).map(|k| k as f64 / RATE).collect();
@@ -280,7 +280,7 @@ fn a_model_fitted_through_its_motion_has_its_own_losses() {
         periodic: list(&["upper", "lower"]),
         ..Columns::default()
     };
-    let recording = read_recording(&[&data], &meaning).unwrap().recording;
+    let recording = LoadedRecording::read(&[&data], &meaning).unwrap().recording;
     let measured = RecordingSplit::new(&recording, &PrepareOptions::default()).unwrap();
     let sets = measured.datasets::<f32>(lnn::recording::Targets::Motion).unwrap();
     let mut objective = Objective::new(&header.architecture, Penalty::None, 1).unwrap();

@@ -1,7 +1,7 @@
 //! `lnn formula`: a Lagrangian as a formula, from motion and from a model.
 
 use crate::running::lnn;
-use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, configure_system};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, SystemInstance};
 use lnn::random::RngStream;
 use lnn::rollout::{RolloutOptions, rollout};
 use rand_distr::{Distribution, StandardNormal};
@@ -106,7 +106,7 @@ fn a_formula_with_friction_is_a_system_that_loses_energy() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     let system =
-        configure_system::<f64>(std::borrow::Cow::Owned(lnn::pipeline::parse_system(DAMPED).unwrap()), &[]).unwrap();
+        SystemInstance::<f64>::new(std::borrow::Cow::Owned(lnn::pipeline::parse_system(DAMPED).unwrap()), &[]).unwrap();
     fs::write(at("swings.csv"), swings_of(&*system.build().unwrap(), &STARTS)).unwrap();
     let data = ["formula", &at("swings.csv"), "--coords", "a", "--periodic", "a", "--trajectory", "run", "--friction"];
     let found = lnn(&[&data[..], &["--json", "--out", &at("found.toml")]].concat());

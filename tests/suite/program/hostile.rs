@@ -39,7 +39,7 @@
 #![cfg(unix)]
 
 use crate::running::{Folder, HEADER, Run, command, inspect, lnn, model, text};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::network::ModelFile;
 use lnn::presets::Preset;
 use std::fs;
@@ -244,7 +244,7 @@ fn states_are_placed_by_row_and_column() {
 
 /// The quick configuration of a double pendulum.
 fn configuration() -> String {
-    let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (8, 4, 4);
     config.network.hidden = vec![2];
     config.phases[0].epochs = 1;

@@ -2,14 +2,14 @@
 
 use crate::program::fit::{COLUMNS, pendulum};
 use crate::running::{Folder, Run, command, lnn, text};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use std::fs;
 use std::path::Path;
 
 /// A training of an instant.
 fn configuration(folder: &Folder) -> String {
-    let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (128, 32, 32);
     config.network.hidden = vec![4];
     config.phases[0].epochs = 2;

@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use crate::running::{Folder, HEADER, Run, command, lnn, text};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use serde_json::Value;
 use std::fs;
@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 
 /// A training of an instant.
 fn configuration(folder: &Folder) -> String {
-    let mut config = Preset::Quick.config(&configure("harmonic-oscillator", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("harmonic-oscillator", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (64, 16, 16);
     config.network.hidden = vec![4];
     config.phases[0].epochs = 2;

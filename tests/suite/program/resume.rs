@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use lnn::configuration::Config;
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use lnn::training::{LATEST, PREVIOUS};
 use serde_json::Value;
@@ -74,7 +74,7 @@ impl Folder {
 const EPOCHS: usize = 400;
 
 fn config(epochs: usize) -> Config {
-    let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (4096, 128, 128);
     config.network.hidden = vec![16, 16];
     config.phases[0].epochs = epochs;

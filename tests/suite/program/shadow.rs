@@ -1,7 +1,7 @@
 //! `lnn shadow` from outside.
 
 use crate::running::{Folder, lnn, text};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::network::{Header, Layout, ModelFile, StoredPrecision};
 use serde_json::Value;
 use std::fs;
@@ -20,14 +20,14 @@ fn size(folder: &Folder, name: &str) -> (u32, u32) {
 
 /// A metric that nobody learned: a network without weights, flat space up to a factor.
 fn flat_network(folder: &Folder) -> String {
-    let system = configure::<f64>("schwarzschild-cartesian", &[]).unwrap();
+    let system = SystemInstance::<f64>::named("schwarzschild-cartesian", &[]).unwrap();
     let config = lnn::presets::Preset::Quick.config(&system).unwrap();
     let architecture = config.architecture(&system, vec![1.0; 4]).unwrap();
     assert_eq!(architecture.form.cyclic, [0]);
     let weights = vec![0.0; Layout::new(&architecture).parameters];
     let columns = system.system.columns(4);
     let header = Header {
-        format: lnn::network::FORMAT,
+        format: lnn::network::Header::FORMAT,
         crate_version: env!("CARGO_PKG_VERSION").to_string(),
         architecture,
         system: "schwarzschild-cartesian".to_string(),

@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use crate::running::{Folder, Run, command, lnn, text, wait_for, wait_until};
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use lnn::storage::Disk;
 use lnn::training::{LATEST, saved};
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 /// A training of so many epochs.
 fn configuration(folder: &Folder, epochs: usize) -> String {
-    let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (512, 64, 64);
     config.network.hidden = vec![8, 8];
     config.phases[0].epochs = epochs;

@@ -2,7 +2,7 @@
 
 use crate::running::{joined, lead, said_by};
 use lnn::configuration::Config;
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::network::ModelFile;
 use lnn::presets::Preset;
 use serde_json::Value;
@@ -31,7 +31,7 @@ fn text(path: &Path) -> String {
 
 /// The quick preset of a system, small enough for a test.
 fn small(system: &str) -> Config {
-    let mut config = Preset::Quick.config(&configure(system, &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named(system, &[]).unwrap()).unwrap();
     config.data.training = 512;
     config.data.validation = 128;
     config.data.test = 128;

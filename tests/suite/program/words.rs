@@ -3,7 +3,7 @@
 
 use crate::running::{Folder, HEADER, inspect, lnn, model, text};
 use lnn::configuration::Config;
-use lnn::lagrangian::configure;
+use lnn::lagrangian::SystemInstance;
 use lnn::presets::Preset;
 use lnn_cli::{check_arguments, parse_config};
 use std::ffi::OsString;
@@ -11,7 +11,7 @@ use std::ffi::OsString;
 /// Every value of every key of a whole configuration, replaced by what it cannot be, is refused by line and key.
 #[test]
 fn every_wrong_value_of_a_configuration_is_placed() {
-    let config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    let config = Preset::Quick.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
     let good = toml::to_string(&config).unwrap();
     parse_config::<Config>(&good).unwrap();
     for (k, line) in good.lines().enumerate() {

@@ -2,7 +2,7 @@
 
 use crate::common::forms::{KINDS, Trial, stated, values};
 use lnn::identification::{Identified, IdentifyOptions, identify};
-use lnn::lagrangian::{Description, EulerLagrange, SystemInstance, configure_system, inverse_dynamics};
+use lnn::lagrangian::{Description, EulerLagrange, InverseDynamics, SystemInstance};
 use lnn::linalg::is_positive_definite;
 use lnn::random::RngStream;
 use lnn::recording::{RecordedTrajectory, Recording};
@@ -60,7 +60,7 @@ const TRUTH: [(&str, f64); 18] = [
 
 fn arm(given: &[(String, String)]) -> SystemInstance<f64> {
     let description: Description = serde_json::from_str(ARM).unwrap();
-    configure_system(Cow::Owned(description.system().unwrap()), given).unwrap()
+    SystemInstance::new(Cow::Owned(description.system().unwrap()), given).unwrap()
 }
 
 fn true_arm() -> SystemInstance<f64> {
@@ -89,7 +89,7 @@ fn log(sizes: [f64; 3]) -> Recording {
         };
         let state = [0, 1, 2].map(swing);
         let [own_q, v, a] = [0, 1, 2].map(|order| state.map(|joint| joint[order]));
-        let torque = inverse_dynamics(&model, &own_q, &v, &a).unwrap().external;
+        let torque = InverseDynamics::of(&model, &own_q, &v, &a).unwrap().external;
         q.extend(own_q.iter().zip(sizes).map(|(q, size)| q + draw(if size > 0.0 { 1e-4 } else { 0.0 })));
         force.extend(torque.iter().map(|torque| torque + draw(0.05)));
     }

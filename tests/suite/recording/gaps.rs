@@ -1,7 +1,7 @@
 //! Recordings with dropped frames and uneven clocks beside the same without.
 
-use lnn::lagrangian::{Request, Terms, build};
-use lnn::recording::{Columns, LoadedRecording, SmoothOptions, Smoothing, read_recording};
+use lnn::lagrangian::{Request, SystemInstance, Terms};
+use lnn::recording::{Columns, LoadedRecording, SmoothOptions, Smoothing};
 use lnn::rollout::{RolloutOptions, rollout};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -16,7 +16,7 @@ const SIGMA: f64 = 1e-3;
 /// A take: noisy angles of a double pendulum, and exact velocities and accelerations, `(frames, 2)` each.
 fn takes() -> Vec<[Vec<f64>; 3]> {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let model = build::<f64>("double-pendulum", &[]).unwrap();
+    let model = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
     let mut take = |_| {
         let start: [f64; 4] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
         let options = RolloutOptions::reference((FRAMES - 1) as f64 * STEP, STEP);
@@ -42,7 +42,7 @@ fn read(takes: &[[Vec<f64>; 3]], kept: &[Vec<bool>]) -> LoadedRecording {
     std::fs::write(&path, text).unwrap();
     let coords = ["a", "b"].map(String::from).to_vec();
     let columns = Columns { periodic: coords.clone(), coords, trajectory: Some("run".into()), ..Columns::default() };
-    read_recording(&[path], &columns).unwrap()
+    LoadedRecording::read(&[path], &columns).unwrap()
 }
 
 /// Of the samples that are learned from: their share of all frames read, and root mean square errors of velocities and accelerations.

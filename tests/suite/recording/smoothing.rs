@@ -1,6 +1,6 @@
 //! Derivatives of a simulated double pendulum's positions, with noise, against its exact velocities and accelerations.
 
-use lnn::lagrangian::{Request, Terms, build};
+use lnn::lagrangian::{Request, SystemInstance, Terms};
 use lnn::recording::{RecordedTrajectory, Recording, SmoothOptions, Smoothed, Smoothing};
 use lnn::rollout::{RolloutOptions, rollout};
 use rand::SeedableRng;
@@ -11,7 +11,7 @@ const SIGMA: f64 = 1e-3;
 
 /// Noisy positions at 400 samples per second, and exact position, velocity and acceleration.
 fn pendulum() -> (Recording, [Vec<f64>; 3]) {
-    let model = build::<f64>("double-pendulum", &[]).unwrap();
+    let model = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
     let motion =
         rollout(&*model, &[1.6, 0.4], &[0.0, 0.5], &RolloutOptions::reference(12.0, 0.0025)).complete().unwrap();
     let mut terms = Terms::default();

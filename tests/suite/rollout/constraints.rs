@@ -1,8 +1,8 @@
 //! Roll-outs on constraints: order, drift of the constraint and of the energy, starts, failures.
 
 use lnn::lagrangian::{
-    Constrained, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, ManifoldRows, Mechanics, MechanicsError,
-    configure, inverse_dynamics,
+    Constrained, EulerLagrange, ExpressionConstraints, ExpressionLagrangian, InverseDynamics, ManifoldRows, Mechanics,
+    MechanicsError, SystemInstance,
 };
 use lnn::rollout::{Driven, Integrator, RolloutError, RolloutOptions, Trajectory, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -11,7 +11,7 @@ const FIXED: [(Integrator, f64); 4] =
     [(Integrator::Midpoint, 2.0), (Integrator::Variational, 2.0), (Integrator::Gauss4, 4.0), (Integrator::Gauss6, 6.0)];
 
 fn model(name: &str) -> Box<dyn EulerLagrange<f64>> {
-    configure::<f64>(name, &[]).unwrap().build().unwrap()
+    SystemInstance::<f64>::named(name, &[]).unwrap().build().unwrap()
 }
 
 /// Largest defect of constraints and of their rates over all samples.
@@ -109,7 +109,7 @@ fn energy_stays_in_its_band() {
         assert!(first < bound && end < 1.5 * first, "{method:?}: {first:e} {end:e}");
         assert!(defect(&*pendulum, &motion) < 1e-12);
     }
-    let wide = configure::<Dd>("cartesian-chain-1", &[]).unwrap().build().unwrap();
+    let wide = SystemInstance::<Dd>::named("cartesian-chain-1", &[]).unwrap().build().unwrap();
     let [q, v] = [q, v].map(|x| x.map(Dd::of));
     let q = [q[0], -(Dd::of(1.0) - q[0] * q[0]).sqrt()];
     let options = RolloutOptions::new(Dd::of(1.0), Dd::of(1.0)).method(Integrator::Gauss6).step(Dd::of(0.02));
@@ -238,7 +238,7 @@ fn inverse_dynamics_divides_forces_between_the_outside_and_the_constraints() {
         let push: Vec<f64> = (0..n).map(|i| 0.3 * (1.7 * i as f64 + 1.0).sin()).collect();
         let force = |_: f64, _: &[f64], _: &[f64], force: &mut [f64]| force.copy_from_slice(&push);
         let Ok(a) = Driven::new(&*model, &force).acceleration(0.0, &q, &v) else { continue };
-        let found = inverse_dynamics(&*model, &q, &v, &a).unwrap();
+        let found = InverseDynamics::of(&*model, &q, &v, &a).unwrap();
         // The shortest force from outside that does the same: nothing along the rows, and the rest of the push.
         for row in rows.chunks(n) {
             let along: f64 = row.iter().zip(&found.external).map(|(a, f)| a * f).sum();
@@ -255,7 +255,7 @@ fn inverse_dynamics_divides_forces_between_the_outside_and_the_constraints() {
         // An acceleration off the constraints is refused with its distance, 50 along the first row.
         let size = length(&rows[..n]).sqrt();
         let off: Vec<f64> = a.iter().zip(&rows[..n]).map(|(a, row)| a + 50.0 * row / size).collect();
-        match inverse_dynamics(&*model, &q, &v, &off) {
+        match InverseDynamics::of(&*model, &q, &v, &off) {
             Err(MechanicsError::OffConstraints { row: 0, distance, .. }) => {
                 assert!((distance - 50.0).abs() < 1e-6, "{name}: {distance}");
             }

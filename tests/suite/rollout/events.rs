@@ -1,6 +1,6 @@
 //! Events along motions, against closed forms.
 
-use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, build};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, SystemInstance};
 use lnn::rollout::{Event, Integrator, Occurrence, Rollout, RolloutError, RolloutOptions, rollout};
 use lnn::scalar::Scalar;
 use std::f64::consts::{PI, TAU};
@@ -149,7 +149,7 @@ fn an_impact_on_a_slope_keeps_the_momentum_along_it() {
 
 #[test]
 fn a_rod_that_holds_the_ball_holds_it_at_an_impact() {
-    let rod: Box<dyn EulerLagrange<f64>> = build("cartesian-chain-1", &[]).unwrap();
+    let rod: Box<dyn EulerLagrange<f64>> = SystemInstance::named("cartesian-chain-1", &[]).unwrap().build().unwrap();
     let start = ([0.6, -0.8], [0.0, 0.0]);
     for method in [Integrator::Dop853, Integrator::Gauss6] {
         let wall = Event::new("wall", |_, q: &[f64], _: &[f64]| q[0]).falling().restitution(0.9);

@@ -3,7 +3,7 @@
 use crate::common::damped;
 use lnn::lagrangian::systems::DoublePendulum;
 use lnn::lagrangian::systems::HarmonicOscillator;
-use lnn::lagrangian::{EulerLagrange, Lagrangian, Mechanics, Request, Terms, force_parts, inverse_dynamics};
+use lnn::lagrangian::{EulerLagrange, ForceParts, InverseDynamics, Lagrangian, Mechanics, Request, Terms};
 use lnn::rollout::{
     Between, Driven, Force, Integrable, Integrator, Rollout, RolloutError, RolloutOptions, SampledForce, Start,
     rollout, rollout_each,
@@ -292,7 +292,7 @@ fn the_forces_of_a_motion_are_found_again() {
             Driven::new(&chain, &force).acceleration(0.0, &q[at.clone()], &v[at]).unwrap()
         })
         .collect();
-    let found = inverse_dynamics(&chain, &q, &v, &a).unwrap();
+    let found = InverseDynamics::of(&chain, &q, &v, &a).unwrap();
     for k in 0..4 {
         assert!((found.external[k] - torque[k]).abs() < 1e-12, "{found:?}");
         assert!((found.generalized[k] - found.friction[k] - torque[k]).abs() < 1e-12, "{found:?}");
@@ -302,14 +302,14 @@ fn the_forces_of_a_motion_are_found_again() {
     let free = pendulum::<f64>(9.81);
     let mut terms = Terms::default();
     free.terms(&q, &v, Request::ACCELERATION, &mut terms).unwrap();
-    let found = inverse_dynamics(&free, &q, &v, &terms.acceleration).unwrap();
+    let found = InverseDynamics::of(&free, &q, &v, &terms.acceleration).unwrap();
     assert!(found.friction.is_empty() && found.generalized == found.external);
     assert!(found.external.iter().all(|f| f.abs() < 1e-12), "{found:?}");
     // Twice the speed at the same acceleration has four times the Coriolis force, and the same of the others.
     let twice: Vec<f64> = v.iter().map(|v| 2.0 * v).collect();
-    let [slow, fast] = [&v[..], &twice].map(|v| force_parts(&free, &q, v, &a).unwrap());
+    let [slow, fast] = [&v[..], &twice].map(|v| ForceParts::of(&free, &q, v, &a).unwrap());
     let close = |x: f64, y: f64| (x - y).abs() < 1e-11;
-    let found = inverse_dynamics(&free, &q, &v, &a).unwrap().external;
+    let found = InverseDynamics::of(&free, &q, &v, &a).unwrap().external;
     for k in 0..4 {
         assert!(close(fast.coriolis[k], 4.0 * slow.coriolis[k]) && slow.coriolis[k].abs() > 1e-3, "{slow:?} {fast:?}");
         assert!(close(fast.inertial[k], slow.inertial[k]) && close(fast.gravity[k], slow.gravity[k]));
@@ -317,9 +317,9 @@ fn the_forces_of_a_motion_are_found_again() {
         let mass = |j: usize| terms_of(&free, &q, &v).mass_matrix[k / 2 * 4 + k % 2 * 2 + j];
         assert!(close(slow.inertial[k], mass(0) * a[k / 2 * 2] + mass(1) * a[k / 2 * 2 + 1]));
     }
-    assert!(slow.friction.is_empty() && force_parts(&free, &q, &v, &a[..2]).is_err());
-    assert!(inverse_dynamics(&free, &q, &v, &a[..2]).is_err());
-    assert!(inverse_dynamics(&free, &q, &v, &[f64::NAN; 4]).is_err());
+    assert!(slow.friction.is_empty() && ForceParts::of(&free, &q, &v, &a[..2]).is_err());
+    assert!(InverseDynamics::of(&free, &q, &v, &a[..2]).is_err());
+    assert!(InverseDynamics::of(&free, &q, &v, &[f64::NAN; 4]).is_err());
 }
 
 /// What an integrator says of the energy of its own motion does not depend on how often that is sampled.

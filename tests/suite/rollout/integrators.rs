@@ -1,7 +1,7 @@
 //! Structure-preserving integrators: order, reversibility, invariants, energy over long times, and how they fail.
 
 use lnn::lagrangian::systems::{DoublePendulum, SpringPendulum};
-use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Lagrangian, Mechanics, Request, Terms, configure};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Lagrangian, Mechanics, Request, SystemInstance, Terms};
 use lnn::rollout::{Domain, Integrator, Rollout, RolloutError, RolloutOptions, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 
@@ -73,11 +73,11 @@ fn plain<S: Scalar, L: Lagrangian>(system: L) -> Mechanics<L, S> {
 }
 
 fn double_pendulum<S: Scalar>() -> Mechanics<DoublePendulum, S> {
-    Mechanics::new(DoublePendulum, configure("double-pendulum", &[]).unwrap().parameters)
+    Mechanics::new(DoublePendulum, SystemInstance::named("double-pendulum", &[]).unwrap().parameters)
 }
 
 fn spring_pendulum<S: Scalar>() -> Mechanics<SpringPendulum, S> {
-    Mechanics::new(SpringPendulum, configure("spring-pendulum", &[]).unwrap().parameters)
+    Mechanics::new(SpringPendulum, SystemInstance::named("spring-pendulum", &[]).unwrap().parameters)
 }
 
 fn fixed<S: Scalar>(method: Integrator, t_end: f64, dt: f64, step: f64) -> RolloutOptions<S> {

@@ -1,7 +1,7 @@
 //! Cases 33 to 35: order, tolerance and long runs of the integrators, as far as `tests/suite/rollout/integrators.rs` leaves them.
 
 use super::record::{LIMIT, Row};
-use lnn::lagrangian::{EulerLagrange, configure};
+use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::rollout::{Integrable, Integrator, RolloutOptions, rollout, rollout_fixed};
 use lnn::scalar::{Dd, Real, Scalar};
 
@@ -21,7 +21,7 @@ fn orbit(t: Dd) -> [Dd; 4] {
 }
 
 fn kepler<S: Scalar>() -> Box<dyn EulerLagrange<S>> {
-    configure("kepler", &[("mu".into(), "1".into())]).unwrap().build().unwrap()
+    SystemInstance::named("kepler", &[("mu".into(), "1".into())]).unwrap().build().unwrap()
 }
 
 /// Largest error of the samples of a run at a tolerance.
@@ -85,7 +85,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 #[test]
 fn case_33_orders_of_the_adaptive_methods() {
     let given = [("m", "1"), ("k", "1")].map(|(symbol, value)| (symbol.into(), value.into()));
-    let model = configure::<f64>("harmonic-oscillator", &given).unwrap().build().unwrap();
+    let model = SystemInstance::<f64>::named("harmonic-oscillator", &given).unwrap().build().unwrap();
     for (method, order, quarters) in [(Integrator::Dopri5, 5.0, 20..=44), (Integrator::Dop853, 8.0, 39..=54)] {
         let t_end = 60.0;
         let (sin, cos) = Dd::of_f64(t_end).sin_cos();
@@ -109,8 +109,8 @@ fn case_33_orders_of_the_adaptive_methods() {
 /// Exponent of the growth of the energy error of Henon-Heiles over `steps` steps of order 6, root mean square over
 /// `starts` and over octaves of time.
 fn exponent<S: Scalar>(h: f64, steps: usize, starts: usize) -> f64 {
-    let model = configure::<S>("henon-heiles", &[]).unwrap().build().unwrap();
-    let judge = configure::<Dd>("henon-heiles", &[]).unwrap().build().unwrap();
+    let model = SystemInstance::<S>::named("henon-heiles", &[]).unwrap().build().unwrap();
+    let judge = SystemInstance::<Dd>::named("henon-heiles", &[]).unwrap().build().unwrap();
     let t_end = h * steps as f64;
     let mut squares = vec![0.0; 1025];
     for k in 0..starts {

@@ -3,7 +3,7 @@
 use crate::common::accuracy::cast;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, initial_weights};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer};
 use lnn::scalar::{Dd, Scalar};
 use lnn::tape::{Depth, Evaluation, STATES};
 use lnn::training::{BatchReport, Objective};
@@ -28,7 +28,7 @@ pub fn architecture(n: usize, hidden: &[usize], activation: ActivationChoice, al
 }
 
 pub fn weights<S: Scalar>(architecture: &Architecture, seed: u64) -> Vec<S> {
-    initial_weights(architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(seed))
+    architecture.initial_weights(Initialization::Default, &mut ChaCha8Rng::seed_from_u64(seed))
 }
 
 pub fn states<S: Scalar>(n: usize, count: usize, seed: u64) -> Dataset<S> {

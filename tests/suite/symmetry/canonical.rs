@@ -3,7 +3,7 @@
 use super::{Coordinate, PHI, Subject, THETA, line, radius};
 use crate::common::accuracy::{configure, random_state};
 use crate::common::properties;
-use lnn::geometry::geometries;
+use lnn::geometry::Geometry;
 use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, MechanicsError, Request, Terms};
 use lnn::scalar::{Dd, Scalar};
 use lnn::symmetry::{Canonical, CanonicalForm, SymmetryError};
@@ -137,7 +137,7 @@ fn the_metric_takes_the_factor() {
     let sphere = configure::<f64>("sphere-geodesic", &[("R", "3")]).build().unwrap();
     let canonical = Canonical::at(sphere, &[1.0, 0.0], &[0.0, 0.0]).unwrap();
     // s g of s R^2 sin(1) = 1 has the curvature 2/(s R^2).
-    let found = geometries(&canonical, &[0.7, 0.1], &[0.0; 2]).unwrap().remove(0).unwrap();
+    let found = Geometry::of(&canonical, &[0.7, 0.1], &[0.0; 2]).unwrap().remove(0).unwrap();
     assert!((found.curvature.scalar - 2.0 * 1.0f64.sin()).abs() < 1e-13, "{}", found.curvature.scalar);
 }
 

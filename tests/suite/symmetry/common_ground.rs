@@ -1,11 +1,11 @@
 //! Comparison up to factor, gauge, and functions of `L` of geodesics.
 
 use super::{Coordinate, PHI, Subject, THETA, line, radius};
-use lnn::symmetry::{Comparison, compare};
+use lnn::symmetry::Comparison;
 
 fn compared(a: &Subject, b: &Subject) -> Comparison {
     let (q, v) = a.states(300);
-    compare(a.model.as_ref(), b.model.as_ref(), &a.basis(None), (&q, &v)).unwrap()
+    Comparison::of(a.model.as_ref(), b.model.as_ref(), &a.basis(None), (&q, &v)).unwrap()
 }
 
 fn distances(found: &Comparison) -> [f64; 4] {
@@ -71,7 +71,7 @@ fn a_mass_shell_knows_the_slope_of_the_function() {
     }
     let compared = |formula: &str| {
         let other = Subject::formula(&coordinates, formula);
-        compare(other.model.as_ref(), plain.model.as_ref(), &plain.basis(None), (&q, &v)).unwrap()
+        Comparison::of(other.model.as_ref(), plain.model.as_ref(), &plain.basis(None), (&q, &v)).unwrap()
     };
     // On the shell L = -1/2: f = L^2 + 4 L + 7 is -1.75 + 7 there and has the slope 3; what vanishes twice is not seen.
     for more in ["", "+ (1 + x^2 + x_dot^2)*(L + 1/2)^2"] {
@@ -90,5 +90,5 @@ fn a_mass_shell_knows_the_slope_of_the_function() {
 fn other_coordinates_are_refused() {
     let (a, b) = (Subject::formula(&XY, PLAIN), Subject::formula(&XY[..1], "x_dot^2/2"));
     let (q, v) = a.states(10);
-    assert!(compare(a.model.as_ref(), b.model.as_ref(), &a.basis(None), (&q, &v)).is_err());
+    assert!(Comparison::of(a.model.as_ref(), b.model.as_ref(), &a.basis(None), (&q, &v)).is_err());
 }

@@ -165,27 +165,29 @@ fn systems_without_symmetries_have_none() {
 
 #[test]
 fn wrong_questions_are_refused() {
-    use lnn::symmetry::{EXACT, SymmetryError, symmetries};
+    use lnn::symmetry::{Symmetries, SymmetryError};
     let plane = Subject::formula(&[line("x"), line("y")], "(x_dot^2 + y_dot^2)/2");
     let (q, v) = plane.states(10);
-    let ask = |basis, q: &[f64], v: &[f64]| symmetries(plane.model.as_ref(), basis, (q, v), Some(EXACT)).unwrap_err();
+    let ask = |basis, q: &[f64], v: &[f64]| {
+        Symmetries::find(plane.model.as_ref(), basis, (q, v), Some(Symmetries::EXACT)).unwrap_err()
+    };
     let basis = plane.basis(None);
     assert_eq!(ask(&basis, &q, &v), SymmetryError::TooFew { unknowns: 18, states: 10 });
     assert_eq!(ask(&basis, &q, &v[1..]), SymmetryError::Shape { coordinates: 2, q: 20, v: 19 });
     let many = plane.basis("polynomial:12".parse().ok());
-    assert!(symmetries(plane.model.as_ref(), &many, (&q, &v), None).is_err());
+    assert!(Symmetries::find(plane.model.as_ref(), &many, (&q, &v), None).is_err());
     let all = Subject::formula(&["a", "b", "c", "d", "e"].map(line), "a_dot*b_dot + c_dot*d_dot + e_dot^2");
     let (q5, v5) = all.states(5);
     let many = all.basis("polynomial:7".parse().ok());
-    let refused = symmetries(all.model.as_ref(), &many, (&q5, &v5), None).unwrap_err();
+    let refused = Symmetries::find(all.model.as_ref(), &many, (&q5, &v5), None).unwrap_err();
     assert_eq!(refused, SymmetryError::TooMany { unknowns: 4752, most: 4000 });
     let [least, most] = [f64::EPSILON, 0.1];
     for found in [1e308, 0.11, 1e-300, 0.0, -1.0] {
-        let refused = symmetries(plane.model.as_ref(), &basis, (&q, &v), Some(found)).unwrap_err();
+        let refused = Symmetries::find(plane.model.as_ref(), &basis, (&q, &v), Some(found)).unwrap_err();
         assert_eq!(refused, SymmetryError::Tolerance { found, least, most });
     }
     assert!(matches!(
-        symmetries(plane.model.as_ref(), &basis, (&q, &v), Some(f64::NAN)),
+        Symmetries::find(plane.model.as_ref(), &basis, (&q, &v), Some(f64::NAN)),
         Err(SymmetryError::Tolerance { .. })
     ));
     // 32 million numbers are 1.8 million states of 18 unknown coefficients.

@@ -7,8 +7,8 @@ mod exact;
 mod quadratic;
 mod random;
 
-use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, build};
-use lnn::symmetry::{Basis, Chart, Degrees, EXACT, Region, Symmetries, symmetries};
+use lnn::lagrangian::{EulerLagrange, ExpressionLagrangian, Mechanics, SystemInstance};
+use lnn::symmetry::{Basis, Chart, Degrees, Region, Symmetries};
 
 /// A Lagrangian with names, charts and bounds of its coordinates; velocities are within `[-1, 1]` unless said otherwise.
 pub struct Subject {
@@ -56,7 +56,7 @@ impl Subject {
 
     /// A system of the catalogue.
     pub fn system(name: &str, coordinates: &[Coordinate]) -> Self {
-        Self::new(build(name, &[]).unwrap(), coordinates)
+        Self::new(SystemInstance::named(name, &[]).unwrap().build().unwrap(), coordinates)
     }
 
     pub fn basis(&self, degrees: Option<Degrees>) -> Basis {
@@ -71,7 +71,7 @@ impl Subject {
     pub fn symmetries(&self, degrees: Option<Degrees>) -> Symmetries {
         let basis = self.basis(degrees);
         let (q, v) = self.states((3 * (self.names.len() + 1) * basis.len()).max(200));
-        symmetries(self.model.as_ref(), &basis, (&q, &v), Some(EXACT)).unwrap()
+        Symmetries::find(self.model.as_ref(), &basis, (&q, &v), Some(Symmetries::EXACT)).unwrap()
     }
 }
 

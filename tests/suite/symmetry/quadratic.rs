@@ -3,12 +3,12 @@
 use super::{Coordinate, PHI, Subject, THETA, degrees, line, radius};
 use lnn::lagrangian::{Request, Terms};
 use lnn::rollout::{Integrator, RolloutOptions, rollout};
-use lnn::symmetry::{Chart, Degrees, EXACT, Quadratic, quadratic};
+use lnn::symmetry::{Chart, Degrees, Quadratic, Symmetries};
 
 fn found(subject: &Subject, basis: Option<Degrees>) -> Quadratic {
     let known = subject.symmetries(basis);
     let (q, v) = subject.states(700);
-    quadratic(subject.model.as_ref(), &known.basis, &known.fields, (&q, &v), Some(EXACT)).unwrap()
+    Quadratic::find(subject.model.as_ref(), &known.basis, &known.fields, (&q, &v), Some(Symmetries::EXACT)).unwrap()
 }
 
 /// The quantities stay the same along a motion.

@@ -1,8 +1,8 @@
 //! A training that is stopped anywhere and goes on is the training that was never stopped, to the last bit.
 
 use lnn::configuration::{Config, Lbfgs, Phase};
-use lnn::data::{Datasets, sample_all};
-use lnn::lagrangian::configure;
+use lnn::data::Datasets;
+use lnn::lagrangian::SystemInstance;
 use lnn::network::{Architecture, Layout};
 use lnn::presets::Preset;
 use lnn::scalar::Scalar;
@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Two phases of three epochs of four steps, averaged weights, a penalty, polishing.
 fn config() -> Config {
-    let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (200, 40, 40);
     config.network.hidden = vec![8, 8];
     config.optimizer.batch = 64;
@@ -38,7 +38,7 @@ struct Case<S> {
 impl<S: Scalar> Case<S> {
     fn new(config: Config) -> Self {
         let system = config.system().unwrap();
-        let (data, scale) = sample_all::<S>(&config, &system).unwrap();
+        let (data, scale) = Datasets::<S>::sample(&config, &system).unwrap();
         let architecture = config.architecture(&system, scale).unwrap();
         Self { config, architecture, data }
     }

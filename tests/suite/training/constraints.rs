@@ -2,11 +2,9 @@
 
 use lnn::configuration::Penalty;
 use lnn::data::{Dataset, DatasetError};
-use lnn::lagrangian::{EulerLagrange, FormulaConstraints, configure, project};
+use lnn::lagrangian::{EulerLagrange, FormulaConstraints, SystemInstance, project};
 use lnn::network::ModelFile;
-use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure, initial_weights,
-};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, NetworkLagrangian, Structure};
 use lnn::presets::{Trainer, TrainerError};
 use lnn::scalar::{Dd, Real, Scalar};
 use lnn::training::Objective;
@@ -56,7 +54,7 @@ fn the_gradient_goes_through_the_multipliers() {
         }
         let rows: Vec<u32> = (0..7).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let weights: Vec<Dd> = initial_weights(&architecture, Initialization::Default, &mut rng);
+        let weights: Vec<Dd> = architecture.initial_weights(Initialization::Default, &mut rng);
         let mut objective = Objective::<Dd>::new(&architecture, penalty, 1).unwrap();
         let mut gradient = vec![Dd::of(0.0); weights.len()];
         let report = objective.step(&weights, &data, &rows, &mut gradient);
@@ -83,7 +81,7 @@ fn the_gradient_goes_through_the_multipliers() {
 /// What is learned from accelerations on the constraints alone moves as the system does, in directions where it was told nothing.
 #[test]
 fn a_particle_on_a_sphere_is_learned_in_cartesian_coordinates() {
-    let sphere = configure::<f64>("particle-on-sphere", &[]).unwrap().build().unwrap();
+    let sphere = SystemInstance::<f64>::named("particle-on-sphere", &[]).unwrap().build().unwrap();
     let manifold = sphere.manifold().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let (mut q, mut v) = (Vec::new(), Vec::new());
@@ -122,7 +120,7 @@ fn rows_of_another_shape_are_refused() {
     let architecture = architecture(2, 1.0);
     let data = data().with_constraints(vec![0.0, 0.0, 1.0, 2.0], vec![0.0; 2]).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut rng);
     let mut gradient = vec![0.0; weights.len()];
     let mut objective = Objective::<f64>::new(&architecture, Penalty::None, 1).unwrap();
     let report = objective.step(&weights, &data, &[0, 1], &mut gradient);
@@ -151,7 +149,7 @@ fn recorded_states_are_brought_to_their_constraints() {
 
 #[test]
 fn a_trainer_keeps_the_constraints_with_its_model() {
-    let chain = configure::<f64>("cartesian-chain-1", &[]).unwrap().build().unwrap();
+    let chain = SystemInstance::<f64>::named("cartesian-chain-1", &[]).unwrap().build().unwrap();
     let (mut q, mut v) = (Vec::new(), Vec::new());
     for k in 0..200 {
         let (sin, cos) = (0.37 * f64::from(k)).sin_cos();

@@ -2,11 +2,9 @@
 
 use super::faulty::{Fault, Faulty};
 use lnn::configuration::Config;
-use lnn::data::sample_all;
-use lnn::lagrangian::configure;
-use lnn::network::{
-    ActivationChoice, Architecture, FORMAT, Form, Header, InputLayer, Layout, ModelFile, StoredPrecision,
-};
+use lnn::data::Datasets;
+use lnn::lagrangian::SystemInstance;
+use lnn::network::{ActivationChoice, Architecture, Form, Header, InputLayer, Layout, ModelFile, StoredPrecision};
 use lnn::presets::Preset;
 use lnn::storage::{Disk, Files, write_whole};
 use lnn::training::{
@@ -34,7 +32,7 @@ fn model(value: f64) -> ModelFile<f64> {
     };
     let weights = vec![value; Layout::new(&architecture).parameters];
     let header = Header {
-        format: FORMAT,
+        format: Header::FORMAT,
         crate_version: "0.1.0".to_string(),
         architecture,
         system: "harmonic-oscillator".to_string(),
@@ -127,7 +125,7 @@ fn one_fault_leaves_nothing_behind() {
 }
 
 fn config() -> Config {
-    let mut config = Preset::Quick.config(&configure("harmonic-oscillator", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("harmonic-oscillator", &[]).unwrap()).unwrap();
     (config.data.training, config.data.validation, config.data.test) = (64, 16, 16);
     config.network.hidden = vec![4];
     config.optimizer.batch = 16;
@@ -139,7 +137,7 @@ fn config() -> Config {
 fn sit(directory: &Path, files: Arc<dyn Files>, steps: usize) -> usize {
     let config = config();
     let system = config.system().unwrap();
-    let (data, scale) = sample_all::<f32>(&config, &system).unwrap();
+    let (data, scale) = Datasets::<f32>::sample(&config, &system).unwrap();
     let architecture = config.architecture(&system, scale).unwrap();
     let identity = Fingerprint { config: String::new(), data: data.checksums() };
     let parameters = Layout::new(&architecture).parameters;

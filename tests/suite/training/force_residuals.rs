@@ -2,10 +2,10 @@
 
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
-use lnn::lagrangian::inverse_dynamics;
+use lnn::lagrangian::InverseDynamics;
 use lnn::network::{
     ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, JointFriction, Layout, NetworkLagrangian,
-    Sizes, Structure, initial_weights,
+    Sizes, Structure,
 };
 use lnn::training::Objective;
 use rand::{Rng, SeedableRng};
@@ -51,7 +51,7 @@ fn held(seed: u64) -> Dataset<f64> {
 /// Half the mean of the weighted residuals over their scales, without what a force along the constraint of the state makes of them.
 fn expected(architecture: &Architecture, weights: &[f64], data: &Dataset<f64>) -> f64 {
     let network = NetworkLagrangian::new(architecture.clone(), weights.to_vec()).unwrap();
-    let found = inverse_dynamics(&network, data.q(), data.v(), data.a()).unwrap().external;
+    let found = InverseDynamics::of(&network, data.q(), data.v(), data.a()).unwrap().external;
     let pairs = found.iter().zip(data.force()).enumerate();
     let mut residuals: Vec<f64> = pairs.map(|(k, (f, q))| (f - q) / SCALE[k % N]).collect();
     for (state, r) in residuals.chunks_exact_mut(N).enumerate() {
@@ -75,7 +75,7 @@ fn the_loss_is_that_of_the_forces_and_has_its_gradient() {
     ] {
         let architecture = architecture(structure, joints, dissipation);
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let mut weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
+        let mut weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut rng);
         // Friction that is felt.
         let layout = Layout::new(&architecture);
         weights[layout.joint_friction].iter_mut().for_each(|w| *w += rng.random_range(1.0..2.0));
@@ -124,7 +124,7 @@ fn a_singular_mass_matrix_leaves_no_state_out() {
 fn a_state_whose_force_is_not_finite_is_left_out() {
     let architecture = architecture(Structure::Mechanical, JointFriction::Dry, None);
     let mut weights: Vec<f32> =
-        initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(6));
+        architecture.initial_weights(Initialization::Default, &mut ChaCha8Rng::seed_from_u64(6));
     let whole = data(7);
     let mut a = whole.a().to_vec();
     a[3 * N] = 1e38;
@@ -145,13 +145,13 @@ fn joint_friction_is_the_stated_force_and_takes_energy() {
     for joints in [JointFriction::Dry, JointFriction::Stribeck] {
         let architecture = architecture(Structure::Mechanical, joints, None);
         let mut weights: Vec<f64> =
-            initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(8));
+            architecture.initial_weights(Initialization::Default, &mut ChaCha8Rng::seed_from_u64(8));
         let layout = Layout::new(&architecture);
         let parameters: Vec<f64> = (0..layout.joint_friction.len()).map(|k| (1.7 * k as f64).sin()).collect();
         weights[layout.joint_friction].copy_from_slice(&parameters);
         let network = NetworkLagrangian::new(architecture.clone(), weights).unwrap();
         let (q, v) = ([0.3, -0.2, 1.0], [0.7, -1.5, 0.05]);
-        let found = inverse_dynamics(&network, &q, &v, &[0.0; N]).unwrap().friction;
+        let found = InverseDynamics::of(&network, &q, &v, &[0.0; N]).unwrap().friction;
         let softplus = |x: f64| x.exp().ln_1p();
         for i in 0..N {
             let row = |row: usize| parameters[row * N + i];

@@ -5,7 +5,7 @@ use crate::common::properties;
 use lnn::configuration::Penalty;
 use lnn::data::Dataset;
 use lnn::data::{Noise, StateEstimate};
-use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, initial_weights};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout};
 use lnn::recording::RecordedTrajectory;
 use lnn::rollout::Between;
 use lnn::scalar::{Dd, Scalar};
@@ -64,7 +64,7 @@ proptest! {
         far.iter().for_each(|k| q[k * n..(k + 1) * n].fill(-1e9));
         let data = Dataset::new(n, q, v, a).unwrap();
         let data = if weighted { data.with_weights(weight).unwrap() } else { data };
-        let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
+        let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut rng);
         let direction: Vec<f64> = weights.iter().map(|_| rng.random_range(-1.0..1.0)).collect();
         let rows: Vec<u32> = (0..states as u32).collect();
         let penalty = if lambda > 0.0 { Penalty::Eigenvalue { lambda } } else { Penalty::None };
@@ -108,7 +108,7 @@ fn the_gradient_of_shooting_is_that_of_the_mean_over_the_segments_that_count() {
     let double = Segments::<f64>::new(&architecture, &estimated, &noise, 5, 4);
     let exact = Segments::<Dd>::new(&architecture, &estimated, &noise, 5, 4);
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut rng);
     let mut starts = double.starts().to_vec();
     // The first of three segments is too fast for any sensible range.
     starts[2] = 1e9;

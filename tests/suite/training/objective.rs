@@ -9,7 +9,6 @@ use lnn::forward::HyperDual;
 use lnn::lagrangian::{Lagrangian, MechanicsError};
 use lnn::network::{
     ActivationChoice, Architecture, Factor, Form, Initialization, InputLayer, JointFriction, Layout, Structure,
-    initial_weights,
 };
 use lnn::optimizers::{Method, Schedule};
 use lnn::scalar::{Dd, Real, Scalar};
@@ -178,7 +177,7 @@ fn gradient_agrees<S: Scalar>(
 ) {
     let architecture = Architecture { alpha, activation, input_layer, dissipation, ..architecture(n, &[6, 4]) };
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    let mut weights: Vec<S> = initial_weights(&architecture, Initialization::Default, &mut rng);
+    let mut weights: Vec<S> = architecture.initial_weights(Initialization::Default, &mut rng);
     let mut data = random_data::<S>(n, 7, 12);
     if let Some(layout) = Layout::new(&architecture).dissipation {
         // Strong friction that depends on the place, and known forces.
@@ -296,7 +295,7 @@ fn the_gradient_of_sylvesters_penalty_is_right() {
 #[test]
 fn sylvesters_penalty_takes_its_scales_from_the_whole_batch() {
     let architecture = Architecture { alpha: -0.1, ..architecture(2, &[6, 5]) };
-    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(4));
+    let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut ChaCha8Rng::seed_from_u64(4));
     let data = random_data(2, 700, 5);
     let penalty = Penalty::Sylvester { lambda: 2.0, time: None };
     let rows: Vec<u32> = (0..700).collect();
@@ -324,7 +323,7 @@ fn sylvesters_penalty_takes_its_scales_from_the_whole_batch() {
 #[test]
 fn an_inactive_penalty_is_exactly_zero() {
     let architecture = Architecture { alpha: 5.0, ..architecture(2, &[6, 6]) };
-    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(1));
+    let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut ChaCha8Rng::seed_from_u64(1));
     let data = random_data(2, 40, 2);
     let rows: Vec<u32> = (0..40).collect();
     let run = |penalty| {
@@ -341,7 +340,7 @@ fn an_inactive_penalty_is_exactly_zero() {
 #[test]
 fn a_state_of_weight_three_counts_three_times() {
     let architecture = architecture(2, &[6, 5]);
-    let weights = initial_weights::<f64>(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(11));
+    let weights = architecture.initial_weights::<f64>(Initialization::Default, &mut ChaCha8Rng::seed_from_u64(11));
     let times = |k: usize| k % 4;
     let data = random_data::<f64>(2, 40, 12);
     let heavy = data.clone().with_weights((0..40).map(|k| times(k) as f64).collect()).unwrap();
@@ -405,7 +404,7 @@ proptest! {
     ) {
         let architecture = Architecture { alpha, ..architecture(n, &[7, 6]) };
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let weights: Vec<f64> = initial_weights(&architecture, Initialization::VariancePreserving, &mut rng);
+        let weights: Vec<f64> = architecture.initial_weights(Initialization::VariancePreserving, &mut rng);
         let data = random_data(n, 9, seed ^ 1);
         let penalty = Penalty::Eigenvalue { lambda: 2.5 };
         let mut gradient = vec![0.0; weights.len()];

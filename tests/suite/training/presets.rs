@@ -2,7 +2,7 @@
 
 use crate::common::penalties::allow_the_truth;
 use lnn::configuration::Config;
-use lnn::lagrangian::{configure, systems};
+use lnn::lagrangian::{System, SystemInstance};
 use lnn::presets::Preset;
 use lnn::random::RngStream;
 use lnn::rollout::{RolloutOptions, rollout};
@@ -24,8 +24,8 @@ fn shrunk(mut config: Config) -> Config {
 #[test]
 fn every_preset_trains_to_the_same_bits_on_any_number_of_threads() {
     let mut presets = 0;
-    for system in systems() {
-        let configured = configure::<f64>(&system.name, &[]).unwrap();
+    for system in System::all() {
+        let configured = SystemInstance::<f64>::named(&system.name, &[]).unwrap();
         for preset in [Preset::Quick, Preset::Best, Preset::Paper] {
             let Some(config) = preset.config(&configured) else { continue };
             let config = shrunk(config);
@@ -47,7 +47,7 @@ fn every_preset_trains_to_the_same_bits_on_any_number_of_threads() {
 #[test]
 fn exact_motions_of_the_ads_test_stay_among_the_training_states() {
     for name in ["ads2-geodesic", "ads3-geodesic", "ads4-geodesic"] {
-        let system = configure::<f64>(name, &[]).unwrap();
+        let system = SystemInstance::<f64>::named(name, &[]).unwrap();
         let (n, test) = (system.coordinates, system.system.trajectory(system.coordinates));
         let config = Preset::Quick.config(&system).unwrap();
         let exact = system.build().unwrap();
@@ -76,7 +76,7 @@ fn exact_motions_of_the_ads_test_stay_among_the_training_states() {
 /// Every penalty of the presets, once per system, against the exact mass matrices of its training states.
 #[test]
 fn no_penalty_forbids_the_truth() {
-    let built_in = systems().iter().map(|system| configure::<f64>(&system.name, &[]).unwrap());
+    let built_in = System::all().iter().map(|system| SystemInstance::<f64>::named(&system.name, &[]).unwrap());
     let presets = built_in.flat_map(|system| [Preset::Quick, Preset::Paper].map(|preset| preset.config(&system)));
     let configs = presets.flatten().map(shrunk);
     assert!(allow_the_truth(configs) > 20);

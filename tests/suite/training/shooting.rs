@@ -6,10 +6,8 @@ use crate::common::{of_scalar, properties};
 use lnn::configuration::Penalty;
 use lnn::data::{Dataset, Datasets};
 use lnn::data::{Noise, StateEstimate};
-use lnn::lagrangian::{FormulaConstraints, configure};
-use lnn::network::{
-    ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, LinearMap, initial_weights,
-};
+use lnn::lagrangian::{FormulaConstraints, SystemInstance};
+use lnn::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, Layout, LinearMap};
 use lnn::presets::Preset;
 use lnn::recording::RecordedTrajectory;
 use lnn::rollout::Between;
@@ -47,7 +45,7 @@ fn small(n: usize, activation: ActivationChoice, input_layer: InputLayer, embed_
 
 /// Random weights; the parameters of an input layer leave their initial values too, and friction is not small.
 fn draw_weights<S: Scalar>(architecture: &Architecture, rng: &mut ChaCha8Rng) -> Vec<S> {
-    let mut weights: Vec<S> = initial_weights(architecture, Initialization::Default, rng);
+    let mut weights: Vec<S> = architecture.initial_weights(Initialization::Default, rng);
     if let Some(dissipation) = Layout::new(architecture).dissipation {
         dissipation.gamma_range().for_each(|k| weights[k] += S::of_f64(rng.random_range(4.0..5.0)));
     }
@@ -548,7 +546,7 @@ fn a_network_is_fitted_through_its_motion_under_constraints() {
     };
     let circle = formulas(2, &["q0^2 + q1^2 - 1"]).unwrap();
     let motion = bob(48, 1e-3);
-    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(5));
+    let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut ChaCha8Rng::seed_from_u64(5));
     let (tracks, noise) = (motion.estimated(), Noise { q: vec![1e-3; 2], v: vec![] });
     let settings = Shooting { samples_per_segment: 12, epochs: 100, batch: 4, rate: 2e-2, ..Shooting::default() };
     let run = |threads: usize| {
@@ -671,7 +669,7 @@ fn exact_positions_teach_exact_accelerations() {
         form: Form::default(),
     };
     let motion = oscillator(64, 0.0);
-    let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut ChaCha8Rng::seed_from_u64(12));
+    let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut ChaCha8Rng::seed_from_u64(12));
     let tracks = motion.estimated();
     let noise = Noise { q: vec![1e-3], v: vec![] };
     let task = Task {
@@ -732,7 +730,7 @@ fn stopping_after_any_step_changes_nothing() {
         Dataset::<f64>::new(2, draw(), draw(), draw()).unwrap()
     };
     let data = Datasets { training: vec![states(1)], validation: states(2), test: states(3) };
-    let mut config = Preset::Quick.config(&configure("double-pendulum", &[]).unwrap()).unwrap();
+    let mut config = Preset::Quick.config(&SystemInstance::named("double-pendulum", &[]).unwrap()).unwrap();
     config.phases[0].epochs = 1;
     let settings = Shooting { epochs: 4, curvature_every: 3, batch: 2, ..quick() };
     // As a program does it: the training from the checkpoint or the beginning, then multiple shooting.

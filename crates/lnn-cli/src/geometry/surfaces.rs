@@ -4,7 +4,7 @@ use crate::number::index_of;
 use crate::source::Source;
 use crate::{CliError, json, output};
 use lnn::findings::text_table;
-use lnn::geometry::{Change, Surface, surfaces};
+use lnn::geometry::{Change, Surface};
 use lnn::names::pluralize;
 use lnn::scalar::Scalar;
 
@@ -34,7 +34,8 @@ impl<S: Scalar> Line<'_, S> {
             index_of("--surface", "coordinate", name, names)
         });
         let block = block.collect::<Result<Vec<usize>, CliError>>()?;
-        let found = surfaces(&*source.model, &block, self.ends, self.velocity, self.steps).map_err(CliError::data)?;
+        let found =
+            Surface::find(&*source.model, &block, self.ends, self.velocity, self.steps).map_err(CliError::data)?;
         output::print(&if table { self.table(names, &found) } else { self.object(names, &found) })
     }
 

@@ -11,7 +11,7 @@ mod write;
 mod xml;
 
 use crate::lagrangian::system::System;
-use crate::lagrangian::{Description, find, inertia_symbols, is_free_name, loss_symbols};
+use crate::lagrangian::{Description, inertia_symbols, is_free_name, loss_symbols};
 use crate::pipeline::from_table;
 use crate::pipeline::thresholds::{DEFAULT_BOUNDS, DEFAULT_SPEED};
 use rigid::{Body, Place};
@@ -162,7 +162,7 @@ impl Robot {
         let plain = |c: char| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '-' };
         let name: String = self.name.chars().map(plain).take(60).collect();
         let name = name.trim_start_matches('-');
-        match name.is_empty() || find(name).is_ok() {
+        match name.is_empty() || System::named(name).is_ok() {
             true => format!("{name}_robot"),
             false => name.to_string(),
         }

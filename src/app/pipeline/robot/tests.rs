@@ -1,12 +1,12 @@
 use super::rigid::Body;
 use super::*;
-use crate::lagrangian::{SystemInstance, configure_system, inverse_dynamics};
+use crate::lagrangian::{InverseDynamics, SystemInstance};
 use std::borrow::Cow;
 
 const PICKER: &str = include_str!("../../../../examples/systems/picker.urdf");
 
 fn instance(text: &str) -> SystemInstance<f64> {
-    configure_system(Cow::Owned(parse_robot(text).unwrap().0), &[]).unwrap()
+    SystemInstance::new(Cow::Owned(parse_robot(text).unwrap().0), &[]).unwrap()
 }
 
 fn value(instance: &SystemInstance<f64>, symbol: &str) -> f64 {
@@ -15,7 +15,7 @@ fn value(instance: &SystemInstance<f64>, symbol: &str) -> f64 {
 }
 
 fn torques(instance: &SystemInstance<f64>, [q, v, a]: [&[f64]; 3]) -> Vec<f64> {
-    inverse_dynamics(&instance.build().unwrap(), q, v, a).unwrap().external
+    InverseDynamics::of(&instance.build().unwrap(), q, v, a).unwrap().external
 }
 
 fn close(found: &[f64], expected: &[f64], within: f64) {
@@ -77,7 +77,7 @@ velocity_bounds = [-1, 1]
         (),
     );
     let formula =
-        configure_system::<f64>(Cow::Owned(toml::from_str::<Description>(formula).unwrap().system().unwrap()), &[])
+        SystemInstance::<f64>::new(Cow::Owned(toml::from_str::<Description>(formula).unwrap().system().unwrap()), &[])
             .unwrap()
             .build()
             .unwrap();

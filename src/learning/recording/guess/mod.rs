@@ -9,7 +9,7 @@ mod thresholds;
 mod time;
 
 use crate::recording::read::RawTable;
-use crate::recording::{Columns, ColumnsError, DataError, LoadedRecording, read_recording};
+use crate::recording::{Columns, ColumnsError, DataError, LoadedRecording};
 use serde::Serialize;
 use std::path::Path;
 
@@ -38,36 +38,38 @@ impl Guess {
     /// Reads files according to the guess. Inputs were not requested, so if a file lacks one, all are left out.
     ///
     /// # Errors
-    /// Those of [`read_recording`].
+    /// Those of [`LoadedRecording::read`].
     pub fn read<P: AsRef<Path>>(&mut self, files: &[P]) -> Result<LoadedRecording, DataError> {
-        read_recording(files, &self.columns).or_else(|_| {
+        LoadedRecording::read(files, &self.columns).or_else(|_| {
             self.columns.input.clear();
-            read_recording(files, &self.columns)
+            LoadedRecording::read(files, &self.columns)
         })
     }
 }
 
-/// Guesses the meaning of the columns in the first of some files, where `given` does not state it.
-///
-/// A given time, rate, trajectory, force, velocity or acceleration is kept; given angles and units are added to the guessed ones.
-///
-/// # Errors
-/// [`DataError`] for a file that cannot be read as a table, or in which no column can be a coordinate or the time.
-pub fn guess<P: AsRef<Path>>(files: &[P], given: &Columns) -> Result<Guess, DataError> {
-    if given.wide {
-        return Err(
-            ColumnsError(vec!["coords: expected the columns of the coordinates beside wide".to_string()]).into()
-        );
+impl Guess {
+    /// Guesses the meaning of the columns in the first of some files, where `given` does not state it.
+    ///
+    /// A given time, rate, trajectory, force, velocity or acceleration is kept; given angles and units are added to the guessed ones.
+    ///
+    /// # Errors
+    /// [`DataError`] for a file that cannot be read as a table, or in which no column can be a coordinate or the time.
+    pub fn of<P: AsRef<Path>>(files: &[P], given: &Columns) -> Result<Guess, DataError> {
+        if given.wide {
+            return Err(
+                ColumnsError(vec!["coords: expected the columns of the coordinates beside wide".to_string()]).into()
+            );
+        }
+        let Some(file) = files.first().map(AsRef::as_ref) else { return Err(DataError::NoFiles) };
+        let mut table = RawTable::read(file, given.names.as_deref())?;
+        let mut given = given.clone();
+        if table.is_unnamed() {
+            // Formulas cannot contain numbers as names.
+            table.names.iter_mut().for_each(|name| name.insert(0, 'c'));
+            given.names = Some(table.names.clone());
+        }
+        roles::guess(file, &table, &given)
     }
-    let Some(file) = files.first().map(AsRef::as_ref) else { return Err(DataError::NoFiles) };
-    let mut table = RawTable::read(file, given.names.as_deref())?;
-    let mut given = given.clone();
-    if table.is_unnamed() {
-        // Formulas cannot contain numbers as names.
-        table.names.iter_mut().for_each(|name| name.insert(0, 'c'));
-        given.names = Some(table.names.clone());
-    }
-    roles::guess(file, &table, &given)
 }
 
 #[cfg(test)]

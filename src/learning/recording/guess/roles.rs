@@ -10,8 +10,9 @@ use super::thresholds::{
 use super::time::{self, Time, counts};
 use super::{ColumnGuess, Guess};
 use crate::lagrangian::NamedFormula;
+use crate::recording::LoadedRecording;
 use crate::recording::columns::{TIME, formula_in};
-use crate::recording::read::{RawTable, read_recording};
+use crate::recording::read::RawTable;
 use crate::recording::{Columns, DataError, Problem};
 use std::path::Path;
 
@@ -174,7 +175,7 @@ impl Roles<'_> {
             names: self.given.names.clone(),
             ..Columns::default()
         };
-        read_recording(&[file], &columns).is_ok_and(|read| read.recording.tracks.len() > 1)
+        LoadedRecording::read(&[file], &columns).is_ok_and(|read| read.recording.tracks.len() > 1)
     }
 
     fn find_forces(&mut self) {

@@ -6,7 +6,7 @@ fn of(text: &str, given: &Columns) -> Result<Guess, DataError> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("motion.csv");
     fs::write(&file, text).unwrap();
-    guess(&[&file], given)
+    Guess::of(&[&file], given)
 }
 
 fn list(names: &[&str]) -> Vec<String> {
@@ -102,7 +102,7 @@ fn files_without_motion_are_refused() {
     let problem = of(&constant, &Columns::default()).unwrap_err().to_string();
     assert!(problem.contains("t, x"), "{problem}");
     assert!(of("", &Columns::default()).is_err());
-    assert!(guess::<&str>(&[], &Columns::default()).is_err());
+    assert!(Guess::of::<&str>(&[], &Columns::default()).is_err());
 }
 
 #[test]

@@ -44,42 +44,45 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
-/// Reads recorded trajectories.
-///
-/// Every file holds one trajectory, or several distinguished by a column or side by side; long gaps in time cut them further. The format is
-/// recognised by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order), the
-/// first sheet of an Excel workbook (`.xlsx`), anything else is text of numbers, separated by commas, semicolons, tabs, bars or blanks,
-/// with or without a header and with comments behind a `#`; lines end with LF, CR LF, or CR in all of the file. Text may be packed by gzip,
-/// and be in UTF-8, UTF-16 or Windows-1252; its decimals have a point or a comma. The [`LoadedRecording`] states the recognised format.
-///
-/// Numbers are converted to SI, by the units of the description or else by those in brackets after the names of a header; angles are
-/// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted. [`Columns::whole`] keeps
-/// trajectories whole across all gaps. Forces that are formulas are evaluated at the samples.
-///
-/// # Errors
-/// [`DataError`], naming the file and, where there is one, row and column; several mistakes in the rows of a file at once.
-pub fn read_recording<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<LoadedRecording, DataError> {
-    if let Some((formulas, plain)) = ForceFormulas::of(columns)? {
-        let mut reading = read_recording(paths, &plain)?;
-        formulas.apply(columns, &mut reading)?;
-        return Ok(reading);
+impl LoadedRecording {
+    /// Reads recorded trajectories.
+    ///
+    /// Every file holds one trajectory, or several distinguished by a column or side by side; long gaps in time cut them further. The format is
+    /// recognised by the first bytes: arrays of NumPy (`.npy`, `.npz`; floats of 4 or 8 bytes and integers, either order and byte order), the
+    /// first sheet of an Excel workbook (`.xlsx`), anything else is text of numbers, separated by commas, semicolons, tabs, bars or blanks,
+    /// with or without a header and with comments behind a `#`; lines end with LF, CR LF, or CR in all of the file. Text may be packed by gzip,
+    /// and be in UTF-8, UTF-16 or Windows-1252; its decimals have a point or a comma. The [`LoadedRecording`] states the recognised format.
+    ///
+    /// Numbers are converted to SI, by the units of the description or else by those in brackets after the names of a header; angles are
+    /// unwrapped by the nearest turn; rows that repeat the row before digit by digit are left out and counted. [`Columns::whole`] keeps
+    /// trajectories whole across all gaps. Forces that are formulas are evaluated at the samples.
+    ///
+    /// # Errors
+    /// [`DataError`], naming the file and, where there is one, row and column; several mistakes in the rows of a file at once.
+    pub fn read<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<LoadedRecording, DataError> {
+        if let Some((formulas, plain)) = ForceFormulas::of(columns)? {
+            let mut reading = LoadedRecording::read(paths, &plain)?;
+            formulas.apply(columns, &mut reading)?;
+            return Ok(reading);
+        }
+        columns.validate()?;
+        if paths.is_empty() {
+            return Err(DataError::NoFiles);
+        }
+        let recording =
+            Recording { coordinates: columns.coords.clone(), periodic: columns.periodic(), tracks: Vec::new() };
+        let mut reading = LoadedRecording { files: paths.len(), ..LoadedRecording::from(recording) };
+        for (k, path) in paths.iter().enumerate() {
+            let path = path.as_ref();
+            let again = paths[..k].iter().any(|earlier| earlier.as_ref() == path);
+            let added = if again { Err(Problem::Again) } else { add_file(path, columns, &mut reading) };
+            added.map_err(|problem| DataError::File { file: path.display().to_string(), problem })?;
+        }
+        // The names in headers are known only after reading.
+        reading.columns.validate()?;
+        reading.recording.coordinates.clone_from(&reading.columns.coords);
+        Ok(reading)
     }
-    columns.validate()?;
-    if paths.is_empty() {
-        return Err(DataError::NoFiles);
-    }
-    let recording = Recording { coordinates: columns.coords.clone(), periodic: columns.periodic(), tracks: Vec::new() };
-    let mut reading = LoadedRecording { files: paths.len(), ..LoadedRecording::from(recording) };
-    for (k, path) in paths.iter().enumerate() {
-        let path = path.as_ref();
-        let again = paths[..k].iter().any(|earlier| earlier.as_ref() == path);
-        let added = if again { Err(Problem::Again) } else { add_file(path, columns, &mut reading) };
-        added.map_err(|problem| DataError::File { file: path.display().to_string(), problem })?;
-    }
-    // The names in headers are known only after reading.
-    reading.columns.validate()?;
-    reading.recording.coordinates.clone_from(&reading.columns.coords);
-    Ok(reading)
 }
 
 /// Adds the trajectories of one file.

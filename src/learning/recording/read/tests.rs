@@ -21,7 +21,7 @@ fn file(name: &str, content: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
 
 pub fn read(content: impl AsRef<[u8]>, columns: &Columns) -> Result<LoadedRecording, DataError> {
     let (_folder, path) = file("data", content.as_ref());
-    read_recording(&[path], columns)
+    LoadedRecording::read(&[path], columns)
 }
 
 pub fn refusal(content: impl AsRef<[u8]>, columns: &Columns) -> String {
@@ -141,13 +141,13 @@ fn wrong_rows_are_named() {
 #[test]
 fn files_that_are_none() {
     let folder = tempfile::tempdir().unwrap();
-    let refused = |path: &Path| read_recording(&[path], &coordinates("q")).unwrap_err().to_string();
+    let refused = |path: &Path| LoadedRecording::read(&[path], &coordinates("q")).unwrap_err().to_string();
     assert!(refused(folder.path()).ends_with("expected a regular file, found a directory"));
     assert!(refused(&folder.path().join("none.csv")).ends_with("none.csv: no such file"));
     let none: [&Path; 0] = [];
-    assert!(matches!(read_recording(&none, &coordinates("q")), Err(DataError::NoFiles)));
+    assert!(matches!(LoadedRecording::read(&none, &coordinates("q")), Err(DataError::NoFiles)));
     let (_folder, path) = file("a.csv", table("t,q1,q2", 20, &[]).as_bytes());
-    let twice = read_recording(&[&path, &path], &coordinates("q1")).unwrap_err().to_string();
+    let twice = LoadedRecording::read(&[&path, &path], &coordinates("q1")).unwrap_err().to_string();
     assert!(twice.ends_with("a.csv: the file is given twice"), "{twice}");
 }
 

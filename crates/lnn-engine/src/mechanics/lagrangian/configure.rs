@@ -134,25 +134,29 @@ pub trait LagrangianVisitor {
     fn visit<L: Lagrangian>(self, lagrangian: &L) -> Self::Output;
 }
 
-/// Returns all systems without constraints; `constrained_systems` returns the others.
-pub fn systems() -> &'static [System] {
-    SYSTEMS
+impl System {
+    /// Returns all systems without constraints; `constrained_systems` returns the others.
+    pub fn all() -> &'static [System] {
+        SYSTEMS
+    }
 }
 
-/// Returns the system with a name.
-///
-/// # Errors
-/// [`SystemError::UnknownSystem`], which suggests the nearest name.
-pub fn find(name: &str) -> Result<&'static System, SystemError> {
-    SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
+impl System {
+    /// Returns the system with a name.
+    ///
+    /// # Errors
+    /// [`SystemError::UnknownSystem`], which suggests the nearest name.
+    pub fn named(name: &str) -> Result<&'static System, SystemError> {
+        SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
+    }
 }
 
 /// Returns the system with a name, including those with constraints.
 ///
 /// # Errors
-/// As [`find`].
+/// As [`System::named`].
 pub fn resolve(name: &str) -> Result<Cow<'static, System>, SystemError> {
-    match find(name) {
+    match System::named(name) {
         Ok(system) => Ok(Cow::Borrowed(system)),
         Err(unknown) => {
             let constrained = constrained_description(name).and_then(|description| description.compile().ok());
@@ -162,7 +166,7 @@ pub fn resolve(name: &str) -> Result<Cow<'static, System>, SystemError> {
 }
 
 impl<S: Scalar> SystemInstance<S> {
-    /// Builds the model, as [`build`](super::build) does.
+    /// Builds the model, as [`SystemInstance::build`](super::SystemInstance::build) does.
     ///
     /// # Errors
     /// [`SystemError::UnknownSystem`] if the description is not in the catalogue or the scalar is not one of `f32`, `f64` and
@@ -171,10 +175,10 @@ impl<S: Scalar> SystemInstance<S> {
         let count = self.inputs().count();
         self.build_with(Box::new((count, |_: S, values: &mut [S]| values.fill(<S as Real>::zero()))))
     }
-    /// Builds the model as [`build`](Self::build) does, with values for the inputs, which are otherwise 0.
+    /// Builds the model as [`SystemInstance::build`](Self::build) does, with values for the inputs, which are otherwise 0.
     ///
     /// # Errors
-    /// Those of [`build`](Self::build).
+    /// Those of [`SystemInstance::build`](Self::build).
     pub fn build_with(&self, inputs: Box<dyn Inputs<S>>) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
         let mut model = unconstrained(self).ok_or_else(|| unknown_system(&self.system.name))?;
         if let Some(forces) = self.forces() {
@@ -427,59 +431,54 @@ fn unknown_system(name: &str) -> SystemError {
     }
 }
 
-/// Parses the parameters of a system in the working precision; missing ones take their defaults.
-///
-/// # Errors
-/// [`SystemError`] for an unknown name or symbol, a repeated symbol, or a value that is not a number or out of range.
-pub fn configure<S: Scalar>(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
-    configure_system(resolve(name)?, given)
-}
-
-/// Does the same as [`configure`] for a given system, either from the catalogue or from a [description](super::Description).
-///
-/// # Errors
-/// [`SystemError`] for an unknown or repeated symbol, or a value that is not a number or out of range.
-pub fn configure_system<S: Scalar>(
-    system: Cow<'static, System>,
-    given: &Given,
-) -> Result<SystemInstance<S>, SystemError> {
-    for (i, (symbol, _)) in given.iter().enumerate() {
-        require_symbol(&system, symbol)?;
-        if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
-            return Err(SystemError::Repeated { symbol: symbol.clone() });
-        }
+impl<S: Scalar> SystemInstance<S> {
+    /// Parses the parameters of a system in the working precision; missing ones take their defaults.
+    ///
+    /// # Errors
+    /// [`SystemError`] for an unknown name or symbol, a repeated symbol, or a value that is not a number or out of range.
+    pub fn named(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
+        SystemInstance::new(resolve(name)?, given)
     }
-    let text = |symbol: &str| given.iter().find(|(s, _)| s == symbol).map(|(_, text)| text.trim());
-    assemble(
-        system,
-        |symbol| text(symbol).map(|text| (text.parse().ok(), text.to_string())),
-        |symbol| text(symbol).map(|text| (S::parse(text), text.to_string())),
-    )
 }
 
-/// Does the same as [`configure_system`] for values that are already numbers.
-///
-/// # Errors
-/// [`SystemError`] for an unknown symbol or a value out of range.
-pub fn configure_values<S: Scalar>(
-    system: Cow<'static, System>,
-    values: &BTreeMap<String, f64>,
-) -> Result<SystemInstance<S>, SystemError> {
-    values.keys().try_for_each(|symbol| require_symbol(&system, symbol))?;
-    let whole = |x: f64| (x >= 0.0 && x.fract() == 0.0).then_some(x as usize);
-    assemble(
-        system,
-        |symbol| values.get(symbol).map(|&x| (whole(x), x.to_string())),
-        |symbol| values.get(symbol).map(|&x| (Some(S::of_f64(x)), x.to_string())),
-    )
+impl<S: Scalar> SystemInstance<S> {
+    /// Does the same as [`SystemInstance::named`] for a given system, either from the catalogue or from a [description](super::Description).
+    ///
+    /// # Errors
+    /// [`SystemError`] for an unknown or repeated symbol, or a value that is not a number or out of range.
+    pub fn new(system: Cow<'static, System>, given: &Given) -> Result<SystemInstance<S>, SystemError> {
+        for (i, (symbol, _)) in given.iter().enumerate() {
+            require_symbol(&system, symbol)?;
+            if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
+                return Err(SystemError::Repeated { symbol: symbol.clone() });
+            }
+        }
+        let text = |symbol: &str| given.iter().find(|(s, _)| s == symbol).map(|(_, text)| text.trim());
+        assemble(
+            system,
+            |symbol| text(symbol).map(|text| (text.parse().ok(), text.to_string())),
+            |symbol| text(symbol).map(|text| (S::parse(text), text.to_string())),
+        )
+    }
 }
 
-/// Builds the model of a system with the given parameters.
-///
-/// # Errors
-/// As [`configure`].
-pub fn build<S: Scalar>(name: &str, given: &Given) -> Result<Box<dyn EulerLagrange<S>>, SystemError> {
-    configure(name, given)?.build()
+impl<S: Scalar> SystemInstance<S> {
+    /// Does the same as [`SystemInstance::new`] for values that are already numbers.
+    ///
+    /// # Errors
+    /// [`SystemError`] for an unknown symbol or a value out of range.
+    pub fn with_values(
+        system: Cow<'static, System>,
+        values: &BTreeMap<String, f64>,
+    ) -> Result<SystemInstance<S>, SystemError> {
+        values.keys().try_for_each(|symbol| require_symbol(&system, symbol))?;
+        let whole = |x: f64| (x >= 0.0 && x.fract() == 0.0).then_some(x as usize);
+        assemble(
+            system,
+            |symbol| values.get(symbol).map(|&x| (whole(x), x.to_string())),
+            |symbol| values.get(symbol).map(|&x| (Some(S::of_f64(x)), x.to_string())),
+        )
+    }
 }
 
 /// Rejects a symbol that the system does not have.
@@ -540,7 +539,7 @@ fn assemble<S: Scalar>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{configure, find};
+    use crate::lagrangian::SystemInstance;
     use crate::scalar::Dd;
 
     fn given(list: &[(&str, &str)]) -> Vec<(String, String)> {
@@ -549,9 +548,9 @@ mod tests {
 
     #[test]
     fn every_entry_is_complete() {
-        for system in systems() {
+        for system in System::all() {
             let n = system.size.default();
-            let configured = configure::<f64>(&system.name, &[]).unwrap();
+            let configured = SystemInstance::<f64>::named(&system.name, &[]).unwrap();
             assert_eq!(configured.build().unwrap().coordinates(), n);
             assert_eq!(system.coordinates(n).len(), n);
             assert_eq!((system.columns(n).len(), system.units(n).len()), (2 * n, 2 * n));
@@ -578,16 +577,16 @@ mod tests {
             let middle: Vec<f64> = system.training(n).positions.iter().map(|b| 0.4 * b.0 + 0.6 * b.1).collect();
             assert_eq!(configured.check_domain(&middle), Ok(()));
         }
-        let pendulum = find("double-pendulum").unwrap();
+        let pendulum = System::named("double-pendulum").unwrap();
         assert_eq!(pendulum.columns(2), ["theta1", "theta2", "theta1_dot", "theta2_dot"]);
         assert_eq!(pendulum.labels(2)[1..3], ["theta2 [rad]", "theta1_dot [rad/s]"]);
-        assert_eq!(find("sphere-geodesic").unwrap().columns(2), ["theta", "phi", "theta_dot", "phi_dot"]);
-        assert!(configure::<f64>("spring-pendulum", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
-        assert!(configure::<f64>("sphere-geodesic", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
-        assert!(configure::<f64>("kepler", &[]).unwrap().check_domain(&[0.0, 0.0]).is_err());
-        assert!(configure::<f64>("ads2-geodesic", &[]).unwrap().check_domain(&[1.0, -1.0]).is_err());
+        assert_eq!(System::named("sphere-geodesic").unwrap().columns(2), ["theta", "phi", "theta_dot", "phi_dot"]);
+        assert!(SystemInstance::<f64>::named("spring-pendulum", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+        assert!(SystemInstance::<f64>::named("sphere-geodesic", &[]).unwrap().check_domain(&[0.0, 1.0]).is_err());
+        assert!(SystemInstance::<f64>::named("kepler", &[]).unwrap().check_domain(&[0.0, 0.0]).is_err());
+        assert!(SystemInstance::<f64>::named("ads2-geodesic", &[]).unwrap().check_domain(&[1.0, -1.0]).is_err());
         // The horizon scales with the mass.
-        let hole = |mass: &str| configure::<f64>("schwarzschild-geodesic", &given(&[("M", mass)])).unwrap();
+        let hole = |mass: &str| SystemInstance::<f64>::named("schwarzschild-geodesic", &given(&[("M", mass)])).unwrap();
         assert_eq!(hole("1").check_domain(&[0.0, 3.0, 1.0, 0.0]), Ok(()));
         assert!(hole("1.5").check_domain(&[0.0, 3.0, 1.0, 0.0]).is_err());
         assert!(hole("1").check_domain(&[0.0, 3.0, 0.0, 0.0]).is_err());
@@ -597,7 +596,7 @@ mod tests {
     #[test]
     fn systems_are_where_they_should_be() {
         let place = |name: &str, list: &[(&str, &str)], q: &[f64]| {
-            configure::<f64>(name, &given(list)).unwrap().position_in_plane(q).unwrap()
+            SystemInstance::<f64>::named(name, &given(list)).unwrap().position_in_plane(q).unwrap()
         };
         let near = |(x, y): (f64, f64), (a, b): (f64, f64), size: f64| {
             // Sine and cosine are accurate to half a unit in the last place, and angles are as accurate as pi.
@@ -623,14 +622,14 @@ mod tests {
         assert_eq!(place("ads2-geodesic", &[], &[1.0, 2.0]), (1.0, 2.0));
         assert_eq!(place("ads3-geodesic", &[], &[1.0, 2.0, 3.0]), (2.0, 3.0));
         assert_eq!(place("ads4-geodesic", &[], &[1.0, 2.0, 3.0, 4.0]), (2.0, 4.0));
-        assert_eq!(configure::<f64>("kepler", &[]).unwrap().position_in_plane(&[1.0]), None);
+        assert_eq!(SystemInstance::<f64>::named("kepler", &[]).unwrap().position_in_plane(&[1.0]), None);
     }
 
     #[test]
     fn places_are_finite_and_no_larger_than_the_system() {
-        for system in systems() {
+        for system in System::all() {
             let n = system.size.default();
-            let configured = configure::<f64>(&system.name, &[]).unwrap();
+            let configured = SystemInstance::<f64>::named(&system.name, &[]).unwrap();
             let bounds = system.training(n).positions;
             let Some(plane) = system.plane else {
                 assert_eq!((n, configured.position_in_plane(&[0.5])), (1, None), "{}", system.name);
@@ -654,11 +653,12 @@ mod tests {
 
     #[test]
     fn parameters_are_read_and_refused() {
-        let configured = configure::<Dd>("double-pendulum", &given(&[("l2", " 0.5 "), ("g", "0")])).unwrap();
+        let configured =
+            SystemInstance::<Dd>::named("double-pendulum", &given(&[("l2", " 0.5 "), ("g", "0")])).unwrap();
         let expected: Vec<Dd> = ["1", "1", "1", "0.5", "0"].iter().map(|t| Dd::parse(t).unwrap()).collect();
         assert_eq!(configured.parameters, expected);
-        assert_eq!(configure::<f32>("n-pendulum", &given(&[("n", "7")])).unwrap().coordinates, 7);
-        let error = |name: &str, list: &[(&str, &str)]| configure::<f64>(name, &given(list)).unwrap_err();
+        assert_eq!(SystemInstance::<f32>::named("n-pendulum", &given(&[("n", "7")])).unwrap().coordinates, 7);
+        let error = |name: &str, list: &[(&str, &str)]| SystemInstance::<f64>::named(name, &given(list)).unwrap_err();
         let text = error("duble-pendulum", &[]).to_string();
         assert_eq!(text, "unknown system \"duble-pendulum\", did you mean \"double-pendulum\"?");
         let text = error("spring-pendulum", &[("L0", "1")]).to_string();
@@ -674,23 +674,24 @@ mod tests {
             assert!(matches!(error("n-pendulum", &[("n", bad)]), SystemError::Value { symbol, .. } if symbol == "n"));
         }
         assert!(matches!(
-            configure::<f64>("double-pendulum", &[]).unwrap().exact_acceleration(&[1.0], &[1.0, 2.0]),
+            SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().exact_acceleration(&[1.0], &[1.0, 2.0]),
             Err(SystemError::State { expected: 2, found: 1, .. })
         ));
     }
 
     #[test]
     fn numbers_and_their_texts_configure_the_same() {
-        let system = || Cow::Borrowed(find("n-pendulum").unwrap());
+        let system = || Cow::Borrowed(System::named("n-pendulum").unwrap());
         let text =
-            |n: &str, g: &str| configure_system::<f64>(system(), &[("n".into(), n.into()), ("g".into(), g.into())]);
-        let number = |n: f64, g: f64| configure_values::<f64>(system(), &[("n".into(), n), ("g".into(), g)].into());
+            |n: &str, g: &str| SystemInstance::<f64>::new(system(), &[("n".into(), n.into()), ("g".into(), g.into())]);
+        let number =
+            |n: f64, g: f64| SystemInstance::<f64>::with_values(system(), &[("n".into(), n), ("g".into(), g)].into());
         let (a, b) = (text("3", "0.1").unwrap(), number(3.0, 0.1).unwrap());
         assert_eq!((a.coordinates, &a.parameters), (b.coordinates, &b.parameters));
         for (n, g) in [(2.5, 9.81), (-1.0, 9.81), (1e9, 9.81), (2.0, f64::NAN)] {
             assert_eq!(text(&n.to_string(), &g.to_string()).unwrap_err(), number(n, g).unwrap_err());
         }
-        let other = configure_values::<f64>(system(), &[("mass".to_string(), 1.0)].into());
+        let other = SystemInstance::<f64>::with_values(system(), &[("mass".to_string(), 1.0)].into());
         assert!(matches!(other, Err(SystemError::UnknownParameter { .. })));
     }
 }

@@ -253,7 +253,7 @@ fn by_clock(name: &str, title: &str, space: &[Bounded<'_>], length: &str, metric
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{Accelerations, configure, configure_system};
+    use crate::lagrangian::{Accelerations, SystemInstance};
     use std::borrow::Cow;
 
     #[test]
@@ -261,7 +261,7 @@ mod tests {
         for description in constrained_descriptions() {
             // The description is checked like one from a file.
             let system = description.system().unwrap();
-            let model = configure_system::<f64>(Cow::Owned(system), &[]).unwrap().build().unwrap();
+            let model = SystemInstance::<f64>::new(Cow::Owned(system), &[]).unwrap().build().unwrap();
             let manifold = model.manifold().unwrap();
             assert!(manifold.redundant().is_empty() && manifold.names().len() < model.coordinates());
         }
@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn long_chains_hang_still_and_fall_freely_where_nothing_pulls() {
         for bobs in [1, 20, 21, 150, MOST_BOBS] {
-            let system = configure::<f64>(&format!("{CHAIN}{bobs}"), &[]).unwrap();
+            let system = SystemInstance::<f64>::named(&format!("{CHAIN}{bobs}"), &[]).unwrap();
             let (model, n) = (system.build().unwrap(), 2 * bobs);
             let at = |x: f64, y: f64| -> Vec<f64> { (1..=bobs).flat_map(|k| [x * k as f64, y * k as f64]).collect() };
             let mut accelerations = Accelerations::new(model.as_ref());
@@ -282,7 +282,7 @@ mod tests {
             assert!(a.chunks_exact(2).all(|a| a[0].abs() < 1e-9 && (a[1] + 9.81).abs() < 1e-9), "{bobs}");
         }
         for name in ["cartesian-chain-0", "cartesian-chain-501", "cartesian-chain-01", "cartesian-chain-+1"] {
-            assert!(configure::<f64>(name, &[]).is_err(), "{name}");
+            assert!(SystemInstance::<f64>::named(name, &[]).is_err(), "{name}");
         }
     }
 }

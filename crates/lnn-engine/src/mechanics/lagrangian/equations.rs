@@ -251,7 +251,7 @@ impl<S: crate::scalar::Scalar> super::GeneralizedForce<S> for Friction<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{Description, EulerLagrange, configure_system};
+    use crate::lagrangian::{Description, EulerLagrange};
     use crate::linalg::{Workspace, inverse};
     use crate::tape::Replay;
     use std::borrow::Cow;
@@ -267,7 +267,7 @@ mod tests {
 
     fn accelerations(description: &Description, p: &[(&str, f64)], q: &[f64], v: &[f64]) -> Vec<f64> {
         let given: Vec<(String, String)> = p.iter().map(|(k, x)| (k.to_string(), x.to_string())).collect();
-        let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &given).unwrap();
+        let instance = SystemInstance::<f64>::new(Cow::Owned(description.system().unwrap()), &given).unwrap();
         let model = instance.build().unwrap();
         assert!(!model.conserves_energy());
         let a = model.acceleration(q, v).unwrap();
@@ -292,7 +292,7 @@ mod tests {
         description.dissipation = Some("(c + e*t)*(b_dot - a_dot)^2/2".to_string());
         let forces = [("a", "k*cos(m*t + a) - e*b_dot*abs(a_dot)"), ("b", "c*t^2")];
         description.forces = forces.map(|(name, text)| (name.to_string(), text.to_string())).into();
-        let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        let instance = SystemInstance::<f64>::new(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         let p = instance.parameters.clone();
         let equations = Equations::record(&instance, &[4, 3, 0], &[]).unwrap().unwrap();
         assert!(equations.known == 1 && instance.is_timed());
@@ -302,7 +302,7 @@ mod tests {
             (0..2).map(|i| found[2 * i] * a[0] + found[2 * i + 1] * a[1] - found[4 + i]).collect()
         };
         // Without the time dependence the equations agree.
-        let free = configure_system::<f64>(Cow::Owned(damped().system().unwrap()), &[]).unwrap();
+        let free = SystemInstance::<f64>::new(Cow::Owned(damped().system().unwrap()), &[]).unwrap();
         let free = Equations::record(&free, &[4, 3, 0], &[]).unwrap().unwrap();
         let [own, other] = [
             evaluated(&equations.motion, &[&x[..2], &x[2..], &t], &p, 6),
@@ -354,7 +354,7 @@ mod tests {
         let mut description = damped();
         description.forces = [("b".to_string(), "-k*b_dot*abs(b_dot) + c*a^2".to_string())].into();
         let a = |p: &[(&str, f64)], q: &[f64], v: &[f64]| accelerations(&description, p, q, v);
-        let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        let instance = SystemInstance::<f64>::new(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         let model = instance.build().unwrap();
         let (q, v) = ([0.3, 1.1], [0.7, -0.4]);
         let mut linearizer = crate::lagrangian::Linearizer::new(&*model);
@@ -392,7 +392,7 @@ mod tests {
     #[test]
     fn slopes_of_accelerations_are_those_of_differences() {
         let description = damped();
-        let instance = configure_system::<f64>(Cow::Owned(description.system().unwrap()), &[]).unwrap();
+        let instance = SystemInstance::<f64>::new(Cow::Owned(description.system().unwrap()), &[]).unwrap();
         // Parameters are sorted by name: c, e, g, k, m.
         let names = ["c", "e", "g", "k", "m"];
         let values = instance.parameters.clone();

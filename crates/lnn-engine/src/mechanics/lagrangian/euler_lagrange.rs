@@ -224,37 +224,34 @@ pub struct InverseDynamics<S> {
     pub multipliers: Vec<S>,
 }
 
-/// Computes the forces that produce the accelerations `a` at the states `(q, v)`, all `(batch, n)` in physical units. No mass matrix is
-/// inverted, so it may be singular.
-///
-/// ```
-/// use lnn::lagrangian::{configure, inverse_dynamics};
-///
-/// // What holds an arm of two rods of 1 m and 1 kg level, g = 9.8 m/s^2.
-/// let arm = configure::<f64>("double-pendulum", &[])?.build()?;
-/// let level = [std::f64::consts::FRAC_PI_2; 2];
-/// let torque = inverse_dynamics(arm.as_ref(), &level, &[0.0; 2], &[0.0; 2])?.external;
-/// assert!((torque[0] - 2.0 * 9.8).abs() < 1e-12 && (torque[1] - 9.8).abs() < 1e-12);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// [`MechanicsError`] of the model; also if the accelerations have another shape or are not finite.
-pub fn inverse_dynamics<S: Scalar>(
-    model: &dyn EulerLagrange<S>,
-    q: &[S],
-    v: &[S],
-    a: &[S],
-) -> Result<InverseDynamics<S>, MechanicsError> {
-    inverse_dynamics_by_drives(model, &[], [q, v, a])
+impl<S: Scalar> InverseDynamics<S> {
+    /// Computes the forces that produce the accelerations `a` at the states `(q, v)`, all `(batch, n)` in physical units. No mass matrix is
+    /// inverted, so it may be singular.
+    ///
+    /// ```
+    /// use lnn::lagrangian::{InverseDynamics, SystemInstance};
+    ///
+    /// // What holds an arm of two rods of 1 m and 1 kg level, g = 9.8 m/s^2.
+    /// let arm = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
+    /// let level = [std::f64::consts::FRAC_PI_2; 2];
+    /// let torque = InverseDynamics::of(arm.as_ref(), &level, &[0.0; 2], &[0.0; 2])?.external;
+    /// assert!((torque[0] - 2.0 * 9.8).abs() < 1e-12 && (torque[1] - 9.8).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`MechanicsError`] of the model; also if the accelerations have another shape or are not finite.
+    pub fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], a: &[S]) -> Result<InverseDynamics<S>, MechanicsError> {
+        inverse_dynamics_by_drives(model, &[], [q, v, a])
+    }
 }
 
-/// Computes [`inverse_dynamics`] with drives, given by the indices of their coordinates: the external force is 0 on all other coordinates.
+/// Computes [`InverseDynamics::of`] with drives, given by the indices of their coordinates: the external force is 0 on all other coordinates.
 /// It is unique if there are as many drives as degrees of freedom, and the smallest one if there are more. Without drives, every coordinate
 /// is driven.
 ///
 /// # Errors
-/// Those of [`inverse_dynamics`]; [`MechanicsError::Drives`] for fewer drives than degrees of freedom, [`MechanicsError::Undriven`] for a
+/// Those of [`InverseDynamics::of`]; [`MechanicsError::Drives`] for fewer drives than degrees of freedom, [`MechanicsError::Undriven`] for a
 /// state that can move while the drives are at rest.
 pub fn inverse_dynamics_by_drives<S: Scalar>(
     model: &dyn EulerLagrange<S>,
@@ -279,21 +276,18 @@ pub struct ForceParts<S> {
     pub friction: Vec<S>,
 }
 
-/// Computes the components of the forces of [`inverse_dynamics`].
-///
-/// # Errors
-/// Those of [`inverse_dynamics`].
-pub fn force_parts<S: Scalar>(
-    model: &dyn EulerLagrange<S>,
-    q: &[S],
-    v: &[S],
-    a: &[S],
-) -> Result<ForceParts<S>, MechanicsError> {
-    let (parts, failures) = force_parts_by_rows(model, [q, v, a], &[])?;
-    failures.first().map_or(Ok(parts), |&error| Err(error))
+impl<S: Scalar> ForceParts<S> {
+    /// Computes the components of the forces of [`InverseDynamics::of`].
+    ///
+    /// # Errors
+    /// Those of [`InverseDynamics::of`].
+    pub fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], a: &[S]) -> Result<ForceParts<S>, MechanicsError> {
+        let (parts, failures) = force_parts_by_rows(model, [q, v, a], &[])?;
+        failures.first().map_or(Ok(parts), |&error| Err(error))
+    }
 }
 
-/// Computes [`force_parts`] at times `(batch)`, which only a time-dependent model needs. Returns an error for every row that fails, whose
+/// Computes [`ForceParts::of`] at times `(batch)`, which only a time-dependent model needs. Returns an error for every row that fails, whose
 /// inertial part is `NaN`. If the momentum depends on the time, its partial derivative by the time counts as gravity.
 ///
 /// # Errors

@@ -40,14 +40,14 @@ mod wrappers;
 
 pub use accelerations::Accelerations;
 pub(crate) use accelerations::Solved;
-pub use configure::{SystemError, SystemInstance, build, configure, configure_system, configure_values, find, systems};
+pub use configure::{SystemError, SystemInstance};
 pub use constraints::{
     Constrained, ConstraintError, ConstraintFormulaError, Constraints, Manifold, ManifoldRows, RowAdjoint,
 };
 pub use derivatives::MetricJet;
 pub use description::{Description, DescriptionError};
 pub use error::MechanicsError;
-pub use euler_lagrange::{ForceParts, InverseDynamics, force_parts, inverse_dynamics};
+pub use euler_lagrange::{ForceParts, InverseDynamics};
 pub use expression::{ExpressionError, ExpressionLagrangian};
 pub use formula_events::GivenEvent;
 pub use formula_readings::FormulaReading;

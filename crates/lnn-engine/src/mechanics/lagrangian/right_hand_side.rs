@@ -11,9 +11,9 @@ use alloc::vec::Vec;
 /// Nothing is allocated after the first call.
 ///
 /// ```
-/// use lnn::lagrangian::{EulerLagrange, build};
+/// use lnn::lagrangian::{EulerLagrange, SystemInstance};
 ///
-/// let pendulum = build::<f64>("double-pendulum", &[])?;
+/// let pendulum = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
 /// let f = pendulum.rhs();
 /// let (mut y, mut dy) = ([1.0, 1.0, 0.0, 0.0], [0.0; 4]);
 /// for _ in 0..100 {
@@ -137,11 +137,11 @@ impl<'a, S: Scalar> RightHandSide<'a, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::build;
+    use crate::lagrangian::SystemInstance;
 
     #[test]
     fn a_right_hand_side_keeps_its_first_error() {
-        let model = build::<f64>("kepler", &[]).unwrap();
+        let model = SystemInstance::<f64>::named("kepler", &[]).unwrap().build().unwrap();
         let f = model.rhs();
         let (mut dy, mut jacobian, mut product) = ([0.0; 4], [0.0; 16], [0.0; 4]);
         let y = [1.0, 0.5, 0.2, 0.9];

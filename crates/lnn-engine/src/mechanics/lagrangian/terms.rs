@@ -165,7 +165,7 @@ fn field<S: Scalar>(
 /// ```
 /// use lnn::prelude::*;
 ///
-/// let arm = lnn::lagrangian::build::<f64>("double-pendulum", &[])?;
+/// let arm = lnn::lagrangian::SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
 /// let a = arm.acceleration(&[0.3, 0.1], &[0.0, 0.0])?; // rad/s^2; several states, one after the other, give as many rows
 /// let m = arm.mass_matrix(&[0.3, 0.1], &[0.0, 0.0])?; // kg m^2, row by row
 /// assert!(a[0] < 0.0 && m.len() == 4 && m[1] == m[2]);

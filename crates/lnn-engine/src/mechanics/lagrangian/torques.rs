@@ -1,7 +1,7 @@
 //! Forces for a given motion, computed with the recursion of a chain of links, and a type that computes them state after state.
 
 use super::recursion::Passes;
-use super::{EulerLagrange, InverseDynamics, MechanicsError, inverse_dynamics};
+use super::{EulerLagrange, InverseDynamics, MechanicsError};
 use crate::scalar::{Scalar, are_finite};
 use alloc::vec::Vec;
 
@@ -47,14 +47,14 @@ fn write_torques<S: Scalar>(
 /// Computes the external forces for a motion, such as the torques of an arm's motors, state after state with preallocated buffers, for use
 /// in a controller.
 ///
-/// The forces equal those of [`inverse_dynamics`]. For a chain of links they are computed by the recursive Newton-Euler method, and nothing
+/// The forces equal those of [`InverseDynamics::of`]. For a chain of links they are computed by the recursive Newton-Euler method, and nothing
 /// is allocated after the first call.
 ///
 /// ```
-/// use lnn::lagrangian::{Torques, configure};
+/// use lnn::lagrangian::{SystemInstance, Torques};
 ///
 /// // What holds an arm of two rods of 1 m and 1 kg level, g = 9.8 m/s^2.
-/// let arm = configure::<f64>("double-pendulum", &[])?.build()?;
+/// let arm = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
 /// let (level, still, mut torques) = ([std::f64::consts::FRAC_PI_2; 2], [0.0; 2], [0.0; 2]);
 /// Torques::new(arm.as_ref()).at(&level, &still, &still, &mut torques)?;
 /// assert!((torques[0] - 2.0 * 9.8).abs() < 1e-12 && (torques[1] - 9.8).abs() < 1e-12);
@@ -74,13 +74,13 @@ impl<'a, S: Scalar> Torques<'a, S> {
     /// Computes the forces at states `q`, `v` for accelerations `a`, all `(batch, n)` in physical units.
     ///
     /// # Errors
-    /// Those of [`inverse_dynamics`]; also if `torques` has the wrong length.
+    /// Those of [`InverseDynamics::of`]; also if `torques` has the wrong length.
     pub fn at(&mut self, q: &[S], v: &[S], a: &[S], torques: &mut [S]) -> Result<(), MechanicsError> {
         if torques.len() != q.len() {
             return Err(MechanicsError::Shape { what: "torques", expected: q.len(), found: torques.len() });
         }
         if !write_torques(self.model, [q, v, a], &mut self.buffer, torques) {
-            torques.copy_from_slice(&inverse_dynamics(self.model, q, v, a)?.external);
+            torques.copy_from_slice(&InverseDynamics::of(self.model, q, v, a)?.external);
         }
         Ok(())
     }

@@ -82,7 +82,7 @@ impl<S: Scalar, D: Dissipation> GeneralizedForce<S> for Rayleigh<D> {
 /// A model with additional forces: `M a = g - c + Q`, where `Q` includes the forces of the model itself.
 ///
 /// ```
-/// use lnn::lagrangian::{Dissipation, EulerLagrange, Rayleigh, Request, Terms, WithForces, configure};
+/// use lnn::lagrangian::{Dissipation, EulerLagrange, Rayleigh, Request, SystemInstance, Terms, WithForces};
 /// use lnn::scalar::Real;
 ///
 /// struct Joints; // D = (c1 v1^2 + c2 (v2 - v1)^2) / 2, c in N m s
@@ -92,7 +92,7 @@ impl<S: Scalar, D: Dissipation> GeneralizedForce<S> for Rayleigh<D> {
 ///     }
 /// }
 ///
-/// let arm = configure::<f64>("double-pendulum", &[])?.build()?;
+/// let arm = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
 /// let damped = WithForces::new(arm, Rayleigh(Joints));
 /// let mut terms = Terms::default();
 /// damped.terms(&[0.3, 0.1], &[1.0, 3.0], Request::ACCELERATION, &mut terms)?;
@@ -289,11 +289,11 @@ impl<S: Scalar> EulerLagrange<S> for Interruptible<'_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::configure;
+    use crate::lagrangian::SystemInstance;
 
     #[test]
     fn a_model_without_its_friction_moves_as_the_bare_one() {
-        let model = || configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
+        let model = || SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
         let friction = |_: &[f64], v: &[f64], force: &mut [f64]| {
             force.iter_mut().zip(v).for_each(|(force, v)| *force = -0.5 * v);
         };
@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn forces_move_and_take_power() {
-        let model = || configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
+        let model = || SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
         let friction = |_: &[f64], v: &[f64], force: &mut [f64]| {
             force.iter_mut().zip(v).for_each(|(force, v)| *force = -0.5 * v);
         };

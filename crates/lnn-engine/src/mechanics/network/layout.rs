@@ -204,52 +204,54 @@ fn learned(description: &Description) -> usize {
     description.parameters.values().filter(|parameter| parameter.learn).count()
 }
 
-/// Draws the flat parameters of a network; the same generator state gives the same weights in every precision.
-///
-/// Every branch is drawn separately, with its own widths and gains; the gain of a linear layer is 1. The parameters of an input layer are
-/// not random: `a = 0.5`, `gamma = 1`, `beta = 0`.
-///
-/// The parameters of a dissipation are drawn last, so that all others do not depend on it: `gamma = -5`, `w = 0`, and `b` of length 1 in
-/// random directions.
-///
-/// Unless near zero, a structure starts with a tenth (a rectangle: three tenths) of these output weights, and with the output biases that
-/// give 1.7 times the identity.
-pub fn initial_weights<S: Scalar>(architecture: &Architecture, kind: Initialization, rng: &mut impl Rng) -> Vec<S> {
-    let layout = Layout::new(architecture);
-    let mut weights = vec![<S as Real>::zero(); layout.parameters];
-    for branch in &layout.branches {
-        let dense = || branch.layers.iter().filter(|layer| layer.map == LinearMap::Dense);
-        let count = dense().count();
-        for (k, layer) in dense().enumerate() {
-            let place = if k + 1 == count { Place::Output } else { Place::Hidden(k) };
-            draw(layer, place, kind, rng, &mut weights);
-        }
-        for layer in &branch.layers {
-            match layer.map {
-                LinearMap::Dense => {}
-                LinearMap::Diagonal => weights[layer.weight_range()].fill(<S as Real>::one()),
-                LinearMap::Scalar => weights[layer.weight_range()].fill(S::of_f64(INITIAL_TANH_SCALE)),
+impl Architecture {
+    /// Draws the flat parameters of a network; the same generator state gives the same weights in every precision.
+    ///
+    /// Every branch is drawn separately, with its own widths and gains; the gain of a linear layer is 1. The parameters of an input layer are
+    /// not random: `a = 0.5`, `gamma = 1`, `beta = 0`.
+    ///
+    /// The parameters of a dissipation are drawn last, so that all others do not depend on it: `gamma = -5`, `w = 0`, and `b` of length 1 in
+    /// random directions.
+    ///
+    /// Unless near zero, a structure starts with a tenth (a rectangle: three tenths) of these output weights, and with the output biases that
+    /// give 1.7 times the identity.
+    pub fn initial_weights<S: Scalar>(&self, kind: Initialization, rng: &mut impl Rng) -> Vec<S> {
+        let layout = Layout::new(self);
+        let mut weights = vec![<S as Real>::zero(); layout.parameters];
+        for branch in &layout.branches {
+            let dense = || branch.layers.iter().filter(|layer| layer.map == LinearMap::Dense);
+            let count = dense().count();
+            for (k, layer) in dense().enumerate() {
+                let place = if k + 1 == count { Place::Output } else { Place::Hidden(k) };
+                draw(layer, place, kind, rng, &mut weights);
+            }
+            for layer in &branch.layers {
+                match layer.map {
+                    LinearMap::Dense => {}
+                    LinearMap::Diagonal => weights[layer.weight_range()].fill(<S as Real>::one()),
+                    LinearMap::Scalar => weights[layer.weight_range()].fill(S::of_f64(INITIAL_TANH_SCALE)),
+                }
             }
         }
-    }
-    if architecture.form.structure.has_signature() && kind != Initialization::NearZero {
-        settle(&layout, &architecture.initial_biases(), architecture.form.factor.variation(), &mut weights);
-    }
-    let constants = architecture.own_constants().map_or(Vec::new(), |(_, initial)| initial);
-    for (place, initial) in layout.constants.clone().zip(constants) {
-        weights[place] = S::of_f64(initial);
-    }
-    let joints = architecture.form.joint_friction.initial(architecture.coordinates);
-    for (place, initial) in layout.joint_friction.clone().zip(joints) {
-        weights[place] = S::of_f64(initial);
-    }
-    if let Some(dissipation) = layout.dissipation {
-        weights[dissipation.gamma_range()].fill(S::of_f64(INITIAL_FRICTION));
-        for row in weights[dissipation.direction_range()].chunks_exact_mut(dissipation.coordinates) {
-            draw_direction(rng, row);
+        if self.form.structure.has_signature() && kind != Initialization::NearZero {
+            settle(&layout, &self.initial_biases(), self.form.factor.variation(), &mut weights);
         }
+        let constants = self.own_constants().map_or(Vec::new(), |(_, initial)| initial);
+        for (place, initial) in layout.constants.clone().zip(constants) {
+            weights[place] = S::of_f64(initial);
+        }
+        let joints = self.form.joint_friction.initial(self.coordinates);
+        for (place, initial) in layout.joint_friction.clone().zip(joints) {
+            weights[place] = S::of_f64(initial);
+        }
+        if let Some(dissipation) = layout.dissipation {
+            weights[dissipation.gamma_range()].fill(S::of_f64(INITIAL_FRICTION));
+            for row in weights[dissipation.direction_range()].chunks_exact_mut(dissipation.coordinates) {
+                draw_direction(rng, row);
+            }
+        }
+        weights
     }
-    weights
 }
 
 /// Initializes a structure with a mass matrix near 1.7 times the identity and almost no forces. A random metric would have curvature forces
@@ -335,7 +337,7 @@ mod tests {
     }
 
     fn drawn(architecture: &Architecture, kind: Initialization) -> Vec<f64> {
-        initial_weights(architecture, kind, &mut ChaCha8Rng::seed_from_u64(1))
+        architecture.initial_weights(kind, &mut ChaCha8Rng::seed_from_u64(1))
     }
 
     fn root_mean_square(numbers: &[f64]) -> f64 {

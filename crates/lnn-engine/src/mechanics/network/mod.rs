@@ -33,9 +33,8 @@ mod thresholds;
 pub use crate::ops::Activation;
 pub use config::{ActivationChoice, Architecture, Initialization, InputLayer, UnknownActivation};
 #[cfg(feature = "model-files")]
-pub use file::{FORMAT, Header, ModelFile, ModelFileError, StoredPrecision};
+pub use file::{Header, ModelFile, ModelFileError, StoredPrecision};
 pub use joint_friction::JointFriction;
-pub use layout::initial_weights;
 pub(crate) use layout::{DissipationLayout, Layer};
 pub use model::{NetworkError, NetworkLagrangian};
 pub use structure::{Factor, Form, Radial, Sizes, Structure};

@@ -119,7 +119,7 @@ impl<S: Scalar> Slopes<S> for NetworkSlopes<'_, S> {
 mod tests {
     use super::*;
     use crate::lagrangian::{EulerLagrange, Linearizer};
-    use crate::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer, initial_weights};
+    use crate::network::{ActivationChoice, Architecture, Form, Initialization, InputLayer};
     use crate::random::RngStream;
     use crate::scalar::Dd;
 
@@ -141,7 +141,7 @@ mod tests {
             form: Form::default(),
         };
         let mut rng = RngStream::Region.generator(3);
-        let weights: Vec<f64> = initial_weights(&architecture, Initialization::Default, &mut rng);
+        let weights: Vec<f64> = architecture.initial_weights(Initialization::Default, &mut rng);
         let network = NetworkLagrangian::new(architecture, weights).unwrap();
         let wide = network.cast::<Dd>();
         let (q, v, w) = ([7.5, -0.4, 0.3, 1.1], [0.6, -1.2, 0.1, 0.4], [0.9, -0.5, 0.2, 1.0]);

@@ -236,7 +236,7 @@ impl<S: Scalar> EulerLagrange<S> for Member<'_, '_, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::configure;
+    use crate::lagrangian::SystemInstance;
     use crate::rollout::{Integrator, rollout_many};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -248,7 +248,7 @@ mod tests {
     /// any number of threads.
     #[test]
     fn motions_together_are_the_motions_alone() {
-        let system = configure::<f64>("double-pendulum", &[]).unwrap().build().unwrap();
+        let system = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap().build().unwrap();
         for method in [Integrator::Dopri5, Integrator::Dop853, Integrator::Gauss4, Integrator::Variational] {
             let options = RolloutOptions { method, step: Some(0.01), ..RolloutOptions::new(2.0, 0.1) };
             let alone = rollout_many(&*system, &starts(11), &options, 2);
@@ -269,7 +269,7 @@ mod tests {
     /// A motion that fails or ends early neither stops the others nor passes its error to them.
     #[test]
     fn one_that_fails_leaves_the_others_alone() {
-        let system = configure::<f64>("spring-pendulum", &[]).unwrap().build().unwrap();
+        let system = SystemInstance::<f64>::named("spring-pendulum", &[]).unwrap().build().unwrap();
         let mut starts = vec![(vec![1.0, 0.3], vec![0.1, 0.2]); 3];
         // r = 0 is singular; the last initial state is rejected before the integration.
         starts[1].0[0] = 0.0;
@@ -303,7 +303,7 @@ mod tests {
 
     /// Returns the outcomes of two members with simultaneous requests, and the number of evaluations.
     fn ask(requests: [Request; 2]) -> ([Result<(), MechanicsError>; 2], usize) {
-        let model = configure::<f64>("spring-pendulum", &[]).unwrap().build().unwrap();
+        let model = SystemInstance::<f64>::named("spring-pendulum", &[]).unwrap().build().unwrap();
         let model = Counted { model, calls: AtomicUsize::new(0) };
         let group = Group::new(&model, 2);
         // The mass matrix is singular at r = 0.

@@ -42,11 +42,11 @@ pub struct FlowGradient<S> {
 /// derivatives of these steps, for a fit, a filter, or a controller.
 ///
 /// ```
-/// use lnn::lagrangian::build;
+/// use lnn::lagrangian::SystemInstance;
 /// use lnn::rollout::Flow;
 ///
 /// // A quarter of a period turns an oscillator: q(T) = v(0), v(T) = -q(0).
-/// let oscillator = build::<f64>("harmonic-oscillator", &[])?;
+/// let oscillator = SystemInstance::<f64>::named("harmonic-oscillator", &[])?.build()?;
 /// let quarter = Flow::new(&*oscillator, std::f64::consts::FRAC_PI_2, 200);
 /// let turned = quarter.jacobian(&[1.0], &[0.0], None)?;
 /// let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-11);
@@ -233,12 +233,12 @@ fn ratio<S: Scalar>((numerator, denominator): (f64, f64)) -> S {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::configure;
+    use crate::lagrangian::SystemInstance;
     use crate::rollout::{RolloutOptions, rollout};
     use crate::scalar::Dd;
 
     fn arm<S: Scalar>(changed: Option<(usize, S)>) -> Box<dyn EulerLagrange<S>> {
-        let mut configured = configure::<S>("double-pendulum", &[]).unwrap();
+        let mut configured = SystemInstance::<S>::named("double-pendulum", &[]).unwrap();
         if let Some((k, by)) = changed {
             configured.parameters[k] += by;
         }

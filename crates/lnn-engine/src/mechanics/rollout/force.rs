@@ -165,10 +165,10 @@ pub(super) fn pieces<S: Scalar>(breaks: &[S], t0: S, t_end: S) -> Vec<Piece<S>> 
 /// A model with an external force `Q(t, q, v)` in addition to its own friction: `M a = g - c - dD/dv + Q`.
 ///
 /// ```
-/// use lnn::lagrangian::configure;
+/// use lnn::lagrangian::SystemInstance;
 /// use lnn::rollout::{Driven, RolloutOptions};
 ///
-/// let arm = configure::<f64>("double-pendulum", &[])?.build()?;
+/// let arm = SystemInstance::<f64>::named("double-pendulum", &[])?.build()?;
 /// // A motor in the shoulder, in N m, and a brake in the elbow.
 /// let motor = |t: f64, _: &[f64], v: &[f64], force: &mut [f64]| {
 ///     force[0] = 2.0 * t.sin();

@@ -267,10 +267,10 @@ mod tests {
     use super::super::models::BROKEN;
     use super::super::{Integrator, rollout};
     use super::*;
-    use crate::lagrangian::build;
+    use crate::lagrangian::SystemInstance;
 
     fn oscillator() -> Box<dyn EulerLagrange<f64>> {
-        build("harmonic-oscillator", &[]).unwrap()
+        SystemInstance::named("harmonic-oscillator", &[]).unwrap().build().unwrap()
     }
 
     /// Joins at most `most` pieces to one trajectory; returns it, the number of pieces, and how the motion ended.

@@ -224,12 +224,12 @@ impl<'a, S: Scalar> Regularity<'a, S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lagrangian::{EulerLagrange, build};
+    use crate::lagrangian::{EulerLagrange, SystemInstance};
 
     #[test]
     fn the_smallest_singular_value_by_the_pattern_is_that_of_all_elements() {
         for name in ["cartesian-chain-1", "cartesian-chain-9", "rolling-disk", "four-bar-linkage"] {
-            let model: Box<dyn EulerLagrange<f64>> = build(name, &[]).unwrap();
+            let model: Box<dyn EulerLagrange<f64>> = SystemInstance::named(name, &[]).unwrap().build().unwrap();
             let number = |k: usize| (0.37 * k as f64 + 0.3).sin();
             let q: Vec<f64> = (0..model.coordinates()).map(number).collect();
             let mut known = Regularity::new(model.manifold().unwrap(), (&q, &q), false);
@@ -249,9 +249,13 @@ mod tests {
     #[test]
     fn a_short_step_is_regular_and_one_through_a_branch_is_not() {
         // When the four bars are in a line, the linkage can continue in two ways.
-        let model: Box<dyn EulerLagrange<f64>> =
-            build("four-bar-linkage", &[("b".to_string(), "3".to_string()), ("c".to_string(), "1".to_string())])
-                .unwrap();
+        let model: Box<dyn EulerLagrange<f64>> = SystemInstance::named(
+            "four-bar-linkage",
+            &[("b".to_string(), "3".to_string()), ("c".to_string(), "1".to_string())],
+        )
+        .unwrap()
+        .build()
+        .unwrap();
         let at = |angle: f64| [angle.cos(), angle.sin(), 3.0 + angle.cos(), angle.sin()];
         let speed = |angle: f64| [-angle.sin(), angle.cos(), -angle.sin(), angle.cos()];
         let start = (&at(-0.5)[..], &speed(-0.5)[..]);

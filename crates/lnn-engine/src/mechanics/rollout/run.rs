@@ -46,7 +46,7 @@ impl<S: Scalar> Rollout<S> {
 /// ```
 /// use lnn::prelude::*;
 ///
-/// let planet = lnn::lagrangian::build::<f64>("kepler", &[])?;
+/// let planet = lnn::lagrangian::SystemInstance::<f64>::named("kepler", &[])?.build()?;
 /// let motion = planet.rollout(&[1.0, 0.0], &[0.0, 1.1], 10.0, 0.1)?; // 10 s, a sample every 0.1 s
 /// let energy = motion.energy.unwrap();
 /// assert!(motion.t.len() == 101 && (energy[100] - energy[0]).abs() < 1e-4);

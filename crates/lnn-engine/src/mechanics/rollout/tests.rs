@@ -2,7 +2,7 @@
 
 use super::models::{BROKEN, EXPLODING, FOUR, KEPLER, OSCILLATOR, PENDULUM, SINGULAR};
 use super::*;
-use crate::lagrangian::{EulerLagrange, build};
+use crate::lagrangian::{EulerLagrange, SystemInstance};
 
 const METHODS: [Integrator; 2] = [Integrator::Dopri5, Integrator::Dop853];
 
@@ -260,14 +260,16 @@ fn long_steps_are_cut<S: crate::scalar::Scalar>(model: &dyn EulerLagrange<S>) {
 
 #[test]
 fn steps_beyond_the_samples_are_cut_in_every_precision() {
-    long_steps_are_cut(&*build::<f32>("harmonic-oscillator", &[]).unwrap());
-    long_steps_are_cut(&*build::<f64>("harmonic-oscillator", &[]).unwrap());
-    long_steps_are_cut(&*build::<crate::scalar::Dd>("harmonic-oscillator", &[]).unwrap());
+    long_steps_are_cut(&*SystemInstance::<f32>::named("harmonic-oscillator", &[]).unwrap().build().unwrap());
+    long_steps_are_cut(&*SystemInstance::<f64>::named("harmonic-oscillator", &[]).unwrap().build().unwrap());
+    long_steps_are_cut(
+        &*SystemInstance::<crate::scalar::Dd>::named("harmonic-oscillator", &[]).unwrap().build().unwrap(),
+    );
 }
 
 #[test]
 fn tolerances_that_cannot_be_kept_are_refused_with_the_least() {
-    let system = build::<f64>("harmonic-oscillator", &[]).unwrap();
+    let system = SystemInstance::<f64>::named("harmonic-oscillator", &[]).unwrap().build().unwrap();
     let run = |method, rtol, atol| {
         let options = RolloutOptions { method, rtol, atol, ..RolloutOptions::new(1.0, 0.1) };
         rollout(&*system, &[1.0], &[2.0], &options)

@@ -1,7 +1,7 @@
 use super::*;
 use crate::lagrangian::{
-    Accelerations, EulerLagrange, ExpressionLagrangian, Interruptible, Mechanics, MechanicsError, Request, Terms,
-    WithForces, build,
+    Accelerations, EulerLagrange, ExpressionLagrangian, Interruptible, Mechanics, MechanicsError, Request,
+    SystemInstance, Terms, WithForces,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -45,11 +45,11 @@ fn accelerations_under_constraints_are_those_of_the_terms() {
         let name = format!("cartesian-chain-{n}");
         // Rods that are stretched pull as well.
         let (q, v) = states(2 * n * batch);
-        check(&name, &*build(&name, &[]).unwrap(), (&q, &v));
+        check(&name, &*SystemInstance::named(&name, &[]).unwrap().build().unwrap(), (&q, &v));
     }
     for name in ["chaplygin-sleigh", "rolling-disk", "rigid-body", "heavy-top", "four-bar-linkage", "particle-on-torus"]
     {
-        let model: Model = build(name, &[]).unwrap();
+        let model: Model = SystemInstance::named(name, &[]).unwrap().build().unwrap();
         let (mut q, v) = states(3 * model.coordinates());
         if model.coordinates() == 9 {
             // Close to a rotation matrix.
@@ -89,7 +89,7 @@ fn dependent_rows_and_singular_masses_are_left_to_the_terms() {
     let nearly = constrained(&[("one", "x + y"), ("other", "x + 1.001*y")]);
     assert!(!Accelerations::new(&nearly).is_solved(&[0.0; 3], &[0.0; 3], &mut [0.0; 3]));
     // With the coordinate time as parameter there is no mass matrix.
-    let clock: Model = build("schwarzschild-by-clock", &[]).unwrap();
+    let clock: Model = SystemInstance::named("schwarzschild-by-clock", &[]).unwrap().build().unwrap();
     let (q, v, mut a) = ([0.0, 8.0, 1.3, 0.4], [1.0, 0.05, 0.01, 0.04], [0.0; 4]);
     Accelerations::new(&*clock).at(&q, &v, &mut a).unwrap();
     for (a, b) in a.iter().zip(clock.acceleration(&q, &v).unwrap()) {
@@ -176,14 +176,14 @@ fn states_are_brought_to_the_constraints_as_without_programs() {
     };
     for n in [1, 2, 5, 30] {
         let name = format!("cartesian-chain-{n}");
-        let model: Model = build(&name, &[]).unwrap();
+        let model: Model = SystemInstance::named(&name, &[]).unwrap().build().unwrap();
         let (noise, v) = states(2 * n);
         let q: Vec<f64> =
             (0..2 * n).map(|i| 0.1 * noise[i] + if i % 2 == 0 { 0.0 } else { -1.0 - (i / 2) as f64 }).collect();
         close(&name, model.manifold().unwrap(), (&q, &v));
     }
     for name in ["chaplygin-sleigh", "rolling-disk", "particle-on-ellipsoid", "particle-on-torus"] {
-        let model: Model = build(name, &[]).unwrap();
+        let model: Model = SystemInstance::named(name, &[]).unwrap().build().unwrap();
         let (q, v) = states(model.coordinates());
         close(name, model.manifold().unwrap(), (&q, &v));
     }
@@ -201,7 +201,7 @@ fn states_are_brought_to_the_constraints_as_without_programs() {
 
 #[test]
 fn corrections_by_programs_are_least_changes() {
-    let model: Model = build("cartesian-chain-12", &[]).unwrap();
+    let model: Model = SystemInstance::named("cartesian-chain-12", &[]).unwrap().build().unwrap();
     let (manifold, n) = (model.manifold().unwrap(), 24);
     let (q, v) = states(n);
     let mut rows = ManifoldRows::default();

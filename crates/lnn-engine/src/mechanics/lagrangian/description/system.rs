@@ -8,7 +8,7 @@ use crate::lagrangian::system::{
     Bounds, Coordinate, LearningAdvice, Parameter, PerSize, Range, ShellAdvice, Size, System, TrajectoryTest,
 };
 use crate::lagrangian::thresholds::{MOST_COORDINATES, MOST_NAMES, SHOWN_NAMES};
-use crate::lagrangian::{ExpressionLagrangian, constrained_description, systems};
+use crate::lagrangian::{ExpressionLagrangian, constrained_description};
 use crate::names::{taken_column, unknown};
 use crate::ops::{Binary, Unary};
 use crate::scalar::{Dd, Scalar};
@@ -50,7 +50,7 @@ impl Description {
     /// The first invalid key and the problem.
     pub fn system(&self) -> Outcome<System> {
         let taken = constrained_description(&self.name);
-        if systems().iter().any(|system| system.name == self.name)
+        if System::all().iter().any(|system| system.name == self.name)
             || taken.is_some_and(|description| description != *self)
         {
             let problem = format!("{} is a system of the catalogue, expected another name", self.name);

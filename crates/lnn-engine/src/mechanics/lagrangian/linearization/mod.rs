@@ -130,10 +130,10 @@ pub struct Gradient<S> {
 /// `eps^(4/5)`.
 ///
 /// ```
-/// use lnn::lagrangian::{Linearizer, build};
+/// use lnn::lagrangian::{Linearizer, SystemInstance};
 ///
 /// // A pendulum of 1 m and 1 kg near its lowest point: a = -g q.
-/// let pendulum = build::<f64>("n-pendulum", &[("n".into(), "1".into())])?;
+/// let pendulum = SystemInstance::<f64>::named("n-pendulum", &[("n".into(), "1".into())])?.build()?;
 /// let mut linearizer = Linearizer::new(&*pendulum);
 /// let motion = linearizer.at(&[0.0], &[0.0])?;
 /// assert!((motion.by_q[0] + 9.8).abs() < 1e-14 && motion.by_v == [0.0] && motion.by_force == [1.0]);

@@ -1,7 +1,7 @@
 use super::{Chain, Passes};
 use crate::lagrangian::{
-    Accelerations, Description, EulerLagrange, Linearization, Linearizer, Request, SystemInstance, Terms, Torques,
-    configure_system, inertia_symbols, inverse_dynamics, loss_symbols,
+    Accelerations, Description, EulerLagrange, InverseDynamics, Linearization, Linearizer, Request, SystemInstance,
+    Terms, Torques, inertia_symbols, loss_symbols,
 };
 use crate::random::RngStream;
 use crate::scalar::Scalar;
@@ -67,7 +67,7 @@ fn arm(links: usize, rng: &mut impl Rng, (friction, armature, tree): (bool, bool
 impl Arm {
     fn configured<S: Scalar>(&self) -> SystemInstance<S> {
         let description: Description = serde_json::from_str(&self.text).unwrap();
-        configure_system(Cow::Owned(description.system().unwrap()), &self.constants).unwrap()
+        SystemInstance::new(Cow::Owned(description.system().unwrap()), &self.constants).unwrap()
     }
 }
 
@@ -158,7 +158,7 @@ fn single_states_are_those_of_the_terms_with_friction() {
         Accelerations::new(model.as_ref()).at(q, v, &mut found).unwrap();
         assert!(distance(&found, &model.acceleration(q, v).unwrap()) < 1e-10, "{what}");
         Torques::new(model.as_ref()).at(q, v, &found, &mut torques).unwrap();
-        let forces = inverse_dynamics(model.as_ref(), q, v, a).unwrap();
+        let forces = InverseDynamics::of(model.as_ref(), q, v, a).unwrap();
         let size = forces.generalized.iter().fold(0f64, |most, x| most.max(x.abs()));
         assert!(torques.iter().all(|torque| torque.abs() < 1e-10 * size), "{what}: {torques:?}");
         Torques::new(model.as_ref()).at(q, v, a, &mut torques).unwrap();
@@ -204,7 +204,7 @@ fn what_stands_beside_the_links_and_singular_masses_are_left_to_the_lagrangian()
     let with = |more: &str| {
         let text = arm.text.replacen('{', &format!("{{{more}, "), 1);
         let description: Description = serde_json::from_str(&text).unwrap();
-        configure_system::<f64>(Cow::Owned(description.system().unwrap()), &arm.constants).unwrap()
+        SystemInstance::<f64>::new(Cow::Owned(description.system().unwrap()), &arm.constants).unwrap()
     };
     let described = |arm: &SystemInstance<f64>| arm.system.described.as_ref().unwrap().chain.is_some();
     assert!(described(&arm.configured()) && described(&with(r#""title": "An arm""#)));

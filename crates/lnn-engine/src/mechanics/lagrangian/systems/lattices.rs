@@ -209,10 +209,10 @@ impl ClosedForm for Cloth {
 
 #[cfg(test)]
 mod tests {
-    use crate::lagrangian::{Accelerations, SystemInstance, configure};
+    use crate::lagrangian::{Accelerations, SystemInstance};
 
     fn sized(name: &str, n: usize) -> SystemInstance<f64> {
-        configure(name, &[("n".to_string(), n.to_string())]).unwrap()
+        SystemInstance::named(name, &[("n".to_string(), n.to_string())]).unwrap()
     }
 
     /// Returns a state within the validation bounds.
@@ -260,7 +260,7 @@ mod tests {
     fn sizes_are_kept_within_bounds() {
         assert_eq!((sized("cloth", 18).coordinates, sized("lattice", 1000).coordinates), (972, 1000));
         for (name, n) in [("cloth", "19"), ("cloth", "0"), ("lattice", "1001"), ("n-pendulum", "1001")] {
-            assert!(configure::<f64>(name, &[("n".to_string(), n.to_string())]).is_err(), "{name} {n}");
+            assert!(SystemInstance::<f64>::named(name, &[("n".to_string(), n.to_string())]).is_err(), "{name} {n}");
         }
         let cloth = sized("cloth", 2);
         let names = cloth.system.columns(cloth.coordinates);

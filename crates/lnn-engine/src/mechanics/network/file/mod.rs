@@ -7,9 +7,7 @@
 
 pub use crate::storage::container::StoredPrecision;
 
-use crate::lagrangian::{
-    Description, EulerLagrange, ExpressionConstraints, FormulaConstraints, SystemInstance, configure_values,
-};
+use crate::lagrangian::{Description, EulerLagrange, ExpressionConstraints, FormulaConstraints, SystemInstance};
 use crate::network::{Architecture, DissipationLayout, Layout, LinearMap};
 use crate::scalar::Scalar;
 use crate::storage::container::{ContainerError, FileKind, Tensor, check_version, pack, unpack};
@@ -26,7 +24,7 @@ pub type ModelFileError = ContainerError;
 pub(crate) const MAX_BYTES: u64 = 1 << 30;
 
 /// Identification of a model file.
-const MODEL: FileKind = FileKind { name: "model", key: "lnn", format: FORMAT };
+const MODEL: FileKind = FileKind { name: "model", key: "lnn", format: Header::FORMAT };
 
 /// A network: its description and its flat parameter vector.
 ///
@@ -184,9 +182,6 @@ fn slots(architecture: &Architecture) -> Result<Vec<Slot>, ModelFileError> {
     Ok(slots)
 }
 
-/// Format that this version writes and reads.
-pub const FORMAT: u32 = 1;
-
 /// Largest number of coordinates of a model; the memory of an evaluation grows with its square, unlike that of a file.
 pub const MAX_COORDINATES: usize = 256;
 
@@ -197,7 +192,7 @@ pub const MAX_WIDTH: usize = 1 << 16;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Header {
-    /// Format of the file, [`FORMAT`].
+    /// Format of the file, [`Header::FORMAT`].
     pub format: u32,
     /// Version of the crate that wrote it.
     pub crate_version: String,
@@ -232,12 +227,15 @@ pub struct Header {
 }
 
 impl Header {
+    /// Format that this version writes and reads.
+    pub const FORMAT: u32 = 1;
+
     /// Checks that lengths match, numbers are finite and sizes are within the limits.
     ///
     /// # Errors
     /// [`ContainerError::Header`] or [`ContainerError::Version`].
     pub(crate) fn validate(&self) -> Result<(), ContainerError> {
-        check_version(FORMAT, self.format, &self.crate_version)?;
+        check_version(Self::FORMAT, self.format, &self.crate_version)?;
         let require = |ok: bool, text: &str| if ok { Ok(()) } else { Err(ContainerError::Header(text.to_string())) };
         self.architecture.validate().map_err(|e| ContainerError::Header(e.to_string()))?;
         let (n, hidden) = (self.architecture.coordinates, &self.architecture.hidden);
@@ -311,7 +309,7 @@ impl Header {
         let described = self.description.as_ref().filter(|description| !description.constraints.is_empty());
         let Some(description) = described else { return Ok(None) };
         let system = description.system().map_err(|error| wrong(format_args!("description.{error}")))?;
-        configure_values(Cow::Owned(system), &self.parameters).map(Some).map_err(wrong)
+        SystemInstance::with_values(Cow::Owned(system), &self.parameters).map(Some).map_err(wrong)
     }
 
     /// Returns the constraints of the motion as functions of the state, with the values of their parameters; `None` if it is free. Those of

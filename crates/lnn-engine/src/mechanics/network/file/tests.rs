@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashMap};
 
 fn header(hidden: Vec<usize>, embed_periodic: bool, precision: StoredPrecision) -> Header {
     Header {
-        format: FORMAT,
+        format: Header::FORMAT,
         crate_version: "0.1.0".to_string(),
         architecture: Architecture {
             coordinates: 2,

@@ -1,6 +1,6 @@
 use super::*;
 use crate::lagrangian::description::quantity::Decimal;
-use crate::lagrangian::{SystemInstance, configure_system, inverse_dynamics};
+use crate::lagrangian::{InverseDynamics, SystemInstance};
 use rand::Rng;
 use std::borrow::Cow;
 
@@ -8,11 +8,11 @@ fn instance(chain: &str, links: &str, pairs: &[(&str, f64)]) -> SystemInstance<f
     let text = format!(r#"{{"name": "arm", "chain": {chain}, "links": {links}}}"#);
     let description: Description = serde_json::from_str(&text).unwrap();
     let given: Vec<(String, String)> = pairs.iter().map(|(name, x)| (name.to_string(), x.to_string())).collect();
-    configure_system(Cow::Owned(description.system().unwrap()), &given).unwrap()
+    SystemInstance::new(Cow::Owned(description.system().unwrap()), &given).unwrap()
 }
 
 fn forces(instance: &SystemInstance<f64>, [q, v, a]: [&[f64]; 3]) -> Vec<f64> {
-    inverse_dynamics(&instance.build().unwrap(), q, v, a).unwrap().external
+    InverseDynamics::of(&instance.build().unwrap(), q, v, a).unwrap().external
 }
 
 fn close(found: &[f64], expected: &[f64]) {
@@ -122,7 +122,7 @@ fn what_the_file_says_is_added_and_kept() {
     let symbols: Vec<&str> = system.parameters.iter().filter(|p| p.learn).map(|p| p.symbol.as_ref()).collect();
     assert!(symbols.contains(&"Izz1") && !symbols.contains(&"m1") && !symbols.contains(&"k"), "{symbols:?}");
     let given = [("Izz1", 0.5), ("Fv1", 0.2)].map(|(name, x)| (name.to_string(), x.to_string()));
-    let instance = configure_system::<f64>(Cow::Owned(system), &given).unwrap();
+    let instance = SystemInstance::<f64>::new(Cow::Owned(system), &given).unwrap();
     close(&forces(&instance, [&[0.2], &[1.5], &[3.0]]), &[1.5 + 0.6 + 0.3 + 2.0 * 1.5_f64.powi(3)]);
     let described = instance.system.described.as_ref().unwrap();
     let again = described.with_defaults(&[("Izz1", 0.25)]);
