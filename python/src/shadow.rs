@@ -10,9 +10,6 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Distance of the sky of an exact metric over that of the camera.
-const FAR: f64 = 100.0;
-
 /// The camera and its rays; angles in degrees.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -82,7 +79,7 @@ pub fn shadow<'py>(
     }
     let camera = choices.camera(choices.chart(&last.columns[..last.columns.len() / 2])?)?;
     let mut tracing = Tracing { tolerance: choices.tolerance, threads: choices.threads, ..Tracing::of(&camera) };
-    let usual = if learned.is_none() { FAR * camera.distance } else { tracing.far };
+    let usual = if learned.is_none() { camera.sky_of_exact() } else { camera.sky_of_learned() };
     tracing.far = choices.far.unwrap_or(usual);
     let pixels = camera.width.saturating_mul(camera.height);
     let most = Camera::MOST_PIXELS;

@@ -1,6 +1,7 @@
 //! Lists the differences between two configurations.
 
 use crate::thresholds::SHOWN_NAMES;
+use lnn::names::first_few;
 use toml::{Table, Value};
 
 /// The first few values that differ, such as `seed: 0 in the checkpoint, 5 requested`; empty if the texts agree.
@@ -9,12 +10,7 @@ pub fn differences(saved: &str, asked: &str) -> String {
         |text: &str| text.parse::<Table>().map(Value::Table).unwrap_or_else(|_| Value::String(text.to_string()));
     let mut found = Vec::new();
     compare("", &parse(saved), &parse(asked), &mut found);
-    let more = found.len().saturating_sub(SHOWN_NAMES);
-    found.truncate(SHOWN_NAMES);
-    if more > 0 {
-        found.push(format!("and {more} more"));
-    }
-    found.join("; ")
+    first_few(&found, SHOWN_NAMES, "; ")
 }
 
 fn compare(path: &str, saved: &Value, asked: &Value, found: &mut Vec<String>) {

@@ -4,6 +4,7 @@ use crate::CliError;
 use crate::files::{holds_something, same_file};
 use crate::resume::{command, has_checkpoint};
 use crate::thresholds::SHOWN_NAMES;
+use lnn::names::first_few;
 use lnn::pipeline::{CAPTIONS, Command, LEARNED, MAX_RESULT_BYTES, PLAY, PipelineError, RUN};
 use lnn::storage::{Disk, Files, read_regular};
 use serde::Deserialize;
@@ -35,7 +36,11 @@ pub fn found(directory: &Path) -> Option<String> {
         .filter(|name| holds_something(&directory.join(name)))
         .chain(pictures(directory))
         .collect();
-    if names.is_empty() { None } else { Some(described(directory).unwrap_or_else(|| listed(&names))) }
+    if names.is_empty() {
+        None
+    } else {
+        Some(described(directory).unwrap_or_else(|| first_few(&names, SHOWN_NAMES, ", ")))
+    }
 }
 
 /// `true` if a file name is that of a picture.
@@ -50,13 +55,6 @@ fn pictures(directory: &Path) -> Vec<String> {
     let mut names: Vec<String> = names.filter(|name| holds_something(&directory.join(name))).collect();
     names.sort();
     names
-}
-
-/// Lists the first few names.
-fn listed(names: &[String]) -> String {
-    let more =
-        if names.len() > SHOWN_NAMES { format!(" and {} more", names.len() - SHOWN_NAMES) } else { String::new() };
-    format!("{}{more}", names[..names.len().min(SHOWN_NAMES)].join(", "))
 }
 
 /// The description of a run from its summary.

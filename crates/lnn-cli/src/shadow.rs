@@ -5,7 +5,7 @@ use crate::learned::{Learned, model_file};
 use crate::number::{choice, index_of, number, thread_count, threads, weight, whole};
 use crate::progress::Progress;
 use crate::source::{Source, parameter};
-use crate::thresholds::{FARTHEST, MOST_EDGES, NEAREST, PIXEL_BYTES, SKY_OF_EXACT, SKY_OF_LEARNED};
+use crate::thresholds::{FARTHEST, MOST_EDGES, NEAREST, PIXEL_BYTES};
 use crate::{CliError, interrupt, system_arg};
 use lnn::lagrangian::{EulerLagrange, MechanicsError};
 use lnn::names::pluralize;
@@ -148,7 +148,9 @@ impl Args {
 
     /// Distance of the sky.
     fn far(&self) -> f64 {
-        self.far.unwrap_or(self.distance * if self.model.is_none() { SKY_OF_EXACT } else { SKY_OF_LEARNED })
+        let camera = Camera::new(self.distance, self.inclination.to_radians());
+        let usual = if self.model.is_none() { camera.sky_of_exact() } else { camera.sky_of_learned() };
+        self.far.unwrap_or(usual)
     }
 
     /// Creates the camera in Cartesian coordinates and the settings of ray tracing; metrics of wormholes are transformed to such

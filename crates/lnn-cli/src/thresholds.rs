@@ -63,10 +63,6 @@ pub const CHARGES_SEED: u64 = 0;
 pub const NEAREST: f64 = 1e-12;
 /// See [`NEAREST`].
 pub const FARTHEST: f64 = 1e15;
-/// Distance of the sky of an exact metric, relative to that of the camera: light is hardly deflected beyond.
-pub const SKY_OF_EXACT: f64 = 100.0;
-/// The same distance for a learned metric, which was trained only up to there.
-pub const SKY_OF_LEARNED: f64 = 2.0;
 
 // What is shown.
 

@@ -2,7 +2,7 @@
 
 use super::coordinates::{Chart, depends_on_time};
 use super::orbits::{along, dot, lower, norm, product, scaled};
-use super::thresholds::EXAMINED_SPAN;
+use super::thresholds::{EXAMINED_SPAN, SKY_OF_EXACT, SKY_OF_LEARNED};
 use super::{RelativityError, expect};
 use crate::geometry::Metric;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
@@ -81,6 +81,16 @@ impl Camera {
             width: 400,
             height: 400,
         }
+    }
+
+    /// Distance of the sky of an exact metric.
+    pub fn sky_of_exact(&self) -> f64 {
+        SKY_OF_EXACT * self.distance
+    }
+
+    /// Distance of the sky of a learned metric.
+    pub fn sky_of_learned(&self) -> f64 {
+        SKY_OF_LEARNED * self.distance
     }
 
     /// Refuses numbers out of range.

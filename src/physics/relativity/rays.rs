@@ -84,9 +84,9 @@ pub struct Tracing {
 }
 
 impl Tracing {
-    /// The defaults for a camera.
+    /// The defaults for a camera, with the sky of a [learned](Camera::sky_of_learned) metric.
     pub fn of(camera: &Camera) -> Self {
-        let far = 2.0 * camera.distance;
+        let far = camera.sky_of_learned();
         Self { tolerance: 1e-6, far, second: 0.0, capture: 0.0, growth: 1e5, most_steps: 2000, threads: 1 }
     }
 

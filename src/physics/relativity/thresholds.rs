@@ -35,6 +35,10 @@ pub(super) const TIME_ROUNDING: f64 = 1e-9;
 pub(super) const EXAMINED_SPAN: f64 = 10.0;
 /// Largest relative deviation of the area radius of distant spheres from that of flat space; the area itself deviates by twice as much.
 pub(super) const MOST_AREA_DEVIATION: f64 = 0.1;
+/// Distance of the sky of an exact metric, relative to that of the camera: light is hardly deflected beyond.
+pub(super) const SKY_OF_EXACT: f64 = 100.0;
+/// The same distance for a learned metric, which was trained only up to there.
+pub(super) const SKY_OF_LEARNED: f64 = 2.0;
 /// Places on either side at which a metric with two sides is examined, each half as far out as the one before.
 pub(super) const EXAMINED_PLACES: i32 = 40;
 /// Smallest sine of the angle from the axis, where the angle about it is not determined: a state closer to the axis is turned away to this

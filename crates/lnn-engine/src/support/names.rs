@@ -21,6 +21,16 @@ pub fn pluralize(count: usize, singular: &str, plural: &str) -> String {
     format!("{count} {}", if count == 1 { singular } else { plural })
 }
 
+/// Lists the first items, separated by `between`, and the number of the others: `a, b and 3 more`.
+pub fn first_few<T: core::fmt::Display>(items: &[T], most: usize, between: &str) -> String {
+    let listed: Vec<String> = items.iter().take(most).map(ToString::to_string).collect();
+    let clause = if between.starts_with(',') { " " } else { between };
+    match items.len().saturating_sub(most) {
+        0 => listed.join(between),
+        more => format!("{}{clause}and {more} more", listed.join(between)),
+    }
+}
+
 /// Formats `unknown WHAT "NAME"` with the nearest candidate, or with all of them if none is near.
 pub fn unknown<'a>(what: &str, name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
     let shown: String = name.chars().take(40).collect();

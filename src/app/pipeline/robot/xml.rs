@@ -1,5 +1,6 @@
 //! Access to the elements of a robot file: numbers, names, and positions of mistakes.
 
+use crate::names::first_few;
 use crate::pipeline::thresholds::{MAX_NODES, SHOWN_ITEMS};
 use roxmltree::{Document, Node, ParsingOptions};
 
@@ -74,8 +75,5 @@ pub(super) fn triple(node: Node<'_, '_>, key: &str, usual: [f64; 3]) -> Result<[
 
 /// Joins items by commas, shortened if there are too many.
 pub(super) fn list(items: &[String]) -> String {
-    match items.len() {
-        count if count > SHOWN_ITEMS => format!("{} and {} more", items[..SHOWN_ITEMS].join(", "), count - SHOWN_ITEMS),
-        _ => items.join(", "),
-    }
+    first_few(items, SHOWN_ITEMS, ", ")
 }

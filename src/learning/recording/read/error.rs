@@ -1,7 +1,7 @@
 //! Mistakes in files of recorded motion.
 
 use super::thresholds::{LISTED_COLUMNS, LISTED_PROBLEMS};
-use crate::names::{one_line, pluralize};
+use crate::names::{first_few, one_line, pluralize};
 use crate::recording::ColumnsError;
 use crate::storage::ReadError;
 use thiserror::Error;
@@ -279,10 +279,5 @@ fn joined(first: &[Problem], more: usize) -> String {
 
 /// Lists the first few column names, such as ` (there are s, x, y)`; empty if there are none.
 fn listed(names: &[String]) -> String {
-    let first = names.iter().take(LISTED_COLUMNS).cloned().collect::<Vec<_>>().join(", ");
-    match names.len() {
-        0 => String::new(),
-        more if more > LISTED_COLUMNS => format!(" (there are {first} and {} more)", more - LISTED_COLUMNS),
-        _ => format!(" (there are {first})"),
-    }
+    if names.is_empty() { String::new() } else { format!(" (there are {})", first_few(names, LISTED_COLUMNS, ", ")) }
 }
