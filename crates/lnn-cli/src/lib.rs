@@ -3,78 +3,32 @@
 //! Results go to standard output, messages and progress to standard error. Exit codes: 0 done, 1 data or files, 2
 //! arguments or configuration, 130 Ctrl-C, 143 SIGTERM, 129 SIGHUP. A failure is one line, `error: FILE: row 3, column theta1: ...`;
 //! of a configuration all mistakes are found, a line for each.
+//!
+//! `commands` has a file for each command. `arguments` holds what several of them take, `directories` what they write into, `terminal` what
+//! they print.
 
-mod certify;
-mod charges;
-mod check;
-mod compare;
-mod config;
-mod constraints;
-mod differences;
-mod error;
-mod evaluate;
-mod files;
-mod fit;
-mod fit_config;
-mod flags;
-mod folder;
-mod forces;
-mod format;
-mod formula;
-mod geometry;
-mod identify;
-mod input;
-mod inspect;
-mod interrupt;
-mod inverse;
-mod json;
-mod layers;
-mod learn;
-mod learned;
-mod manual;
-mod motion;
-mod motion_source;
-mod number;
-mod output;
-mod output_dir;
-mod page;
-mod plain_name;
-mod print_config;
-mod probe;
-mod progress;
+mod arguments;
+mod commands;
+mod directories;
 #[cfg(test)]
 #[path = "../../lnn-engine/src/properties.rs"]
 mod properties;
-mod recording_args;
-mod result_page;
-mod results;
-mod resume;
-mod rollout;
-mod run_args;
-mod run_list;
-mod runs;
-mod shadow;
-mod shard;
-mod source;
-mod spool;
-mod states;
-mod sweep;
-mod symmetries;
-mod system_arg;
-mod systems;
+mod terminal;
 mod thresholds;
-mod train;
-mod train_config;
-mod tube;
-mod watch;
 
-pub use config::parse as parse_config;
-use error::argument_error;
-pub use error::{CliError, Kind};
-pub use output::print;
-pub use runs::{Orders, Work, merge, perform, print_list};
-pub use shard::Shard;
-pub use states::{States, StatesError, parse_states};
+pub use arguments::config::parse as parse_config;
+pub use arguments::states::{States, StatesError, parse_states};
+use arguments::{fit_config, train_config};
+use commands::{
+    certify, check, compare, constraints, evaluate, fit, formula, geometry, identify, inspect, manual, page, rollout,
+    shadow, sweep, symmetries, systems, train,
+};
+pub use directories::runs::{Orders, Work, merge, perform, print_list};
+pub use directories::shard::Shard;
+use terminal::error::argument_error;
+pub use terminal::error::{CliError, Kind};
+pub use terminal::output::print;
+use terminal::{interrupt, output};
 
 use clap::{CommandFactory, Parser, Subcommand};
 use lnn::names::{WIDTH, one_line, wrap_text};

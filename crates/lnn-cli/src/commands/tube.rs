@@ -1,0 +1,160 @@
+//! `--tube` of `lnn rollout`: a tube around the predicted motion that contains a given share of whole motions.
+
+use crate::CliError;
+use crate::arguments::config::parse;
+use crate::arguments::input;
+use crate::arguments::learned::model_file;
+use crate::arguments::number::{number, threads};
+use crate::arguments::recording_args::read;
+use lnn::analysis::{Tube, TubeError, Window, predict_by_motion};
+use lnn::data::{Split, StateEstimate};
+use lnn::lagrangian::EulerLagrange;
+use lnn::pipeline::{FitConfig, FitOptions, MAX_RESULT_BYTES, PreparedFit};
+use lnn::storage::read_regular;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Arguments.
+#[derive(Debug, clap::Args)]
+pub struct TubeArgs {
+    /// A tube around the coordinates that holds this share of whole motions, estimated from the errors on motion that the model has not
+    /// seen: what `lnn fit` held out, or --tube-data. The CSV has two more columns per coordinate, NAME_low and
+    /// NAME_high.
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, requires = "model", value_parser = number(0.01, 0.999))]
+    tube: Option<f64>,
+    /// Recordings of other motions from which the tube is estimated, with the columns of the data that the model was fitted to.
+    #[arg(long, value_name = "DATA,..", value_delimiter = ',', requires = "tube")]
+    tube_data: Vec<PathBuf>,
+}
+
+/// A tube around a motion that starts at a given time.
+pub struct MotionTube {
+    tube: Tube,
+    start: f64,
+    coordinates: Vec<String>,
+}
+
+/// The description of a tube in JSON.
+#[derive(Debug, Serialize)]
+pub struct TubeFacts<'a> {
+    share: f64,
+    /// Number of motions that determined the shape, and number that determined the width.
+    motions: [usize; 2],
+    /// Times ahead in s.
+    times: &'a [f64],
+    /// Half of the width at these times.
+    half_widths: BTreeMap<&'a str, Vec<f64>>,
+}
+
+impl TubeArgs {
+    /// Files that are read.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        self.tube_data.iter().map(PathBuf::as_path)
+    }
+
+    /// The tube of a model for motions from one time to another; none if none was requested.
+    ///
+    /// # Errors
+    /// A usage error for a system or a motion that runs backwards, a data error for a model without the configuration of a fit beside it, for
+    /// recordings that cannot be read, and for too few whole motions.
+    pub fn tube(
+        &self,
+        (model, path): (&dyn EulerLagrange<f64>, Option<&Path>),
+        coordinates: &[String],
+        (start, end): (f64, f64),
+    ) -> Result<Option<MotionTube>, CliError> {
+        let Some(share) = self.tube else { return Ok(None) };
+        let Some(path) = path else {
+            let problem =
+                "the motion of a system is exact; expected a model that lnn fit learned, whose errors are known";
+            return Err(CliError::usage(format_args!("--tube: {problem}")));
+        };
+        if end <= start {
+            return Err(CliError::usage("--tube: the motion runs backwards; expected a later --t-end"));
+        }
+        let windows = self.windows(path, coordinates, end - start)?;
+        let predictions = predict_by_motion(model, &windows, threads(None));
+        let tube = Tube::new(&windows, &predictions, coordinates.len(), share).map_err(|error| match error {
+            TubeError::TooFewWindows { found, needed } => CliError::data(format_args!(
+                "--tube {share}: expected at least {needed} whole motions of {} s that the model has not learned from, found {found}; \
+                 give more with --tube-data",
+                end - start
+            )),
+            error => CliError::data(format_args!("--tube {share}: {error}")),
+        })?;
+        Ok(Some(MotionTube { tube, start, coordinates: coordinates.to_vec() }))
+    }
+
+    /// Beginnings of all motions that were not used for training and last at least `seconds`.
+    fn windows(&self, path: &Path, coordinates: &[String], seconds: f64) -> Result<Vec<Window>, CliError> {
+        let place = model_file(path)?.with_file_name("config.toml");
+        let text = read_regular(&place, MAX_RESULT_BYTES).map_err(|e| {
+            CliError::file(&place, format_args!("--tube needs the configuration of the fit beside the model: {e}"))
+        })?;
+        let config: FitConfig = parse(&String::from_utf8_lossy(&text))
+            .map_err(|(line, problem)| CliError::file(&place, format_args!("line {line}: {problem}")))?;
+        if config.recording.coords != coordinates {
+            let (expected, found) = (coordinates.join(","), config.recording.coords.join(","));
+            return Err(CliError::file(&place, format_args!("coords: expected {expected}, found {found}")));
+        }
+        let files: Vec<PathBuf> = match self.tube_data.is_empty() {
+            true => config.recording.files.iter().map(PathBuf::from).collect(),
+            false => self.tube_data.clone(),
+        };
+        if files.iter().any(|file| input::is_standard(file)) {
+            return Err(CliError::usage("--tube-data: expected files, not standard input"));
+        }
+        let reading = read(&files, &config.recording.meaning())?;
+        let mut options = FitOptions::from(&config);
+        if !self.tube_data.is_empty() {
+            options.held_out = 0.0;
+        }
+        let measured = PreparedFit::new(&reading, &options).map_err(CliError::data)?.measured;
+        Ok(beginnings(if self.tube_data.is_empty() { &measured.test } else { &measured.training }, seconds))
+    }
+}
+
+/// Beginnings of all motions of at least this length, from the first accurate state.
+fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
+    let n = part.recording.n();
+    let estimated = part.estimated();
+    let first = |(estimate, states): (&StateEstimate<'_>, &lnn::recording::Smoothed)| {
+        let samples = states.interior().start..states.times.len();
+        Window::cut(*estimate, samples, n, seconds).into_iter().next()
+    };
+    estimated.iter().zip(&part.states).filter_map(first).collect()
+}
+
+impl MotionTube {
+    /// Lower and upper limits at a sample.
+    pub fn ends<'a>(&self, t: f64, q: &'a [f64]) -> impl Iterator<Item = [f64; 2]> + use<'a> {
+        let half = self.tube.half_widths(t - self.start);
+        q.iter().zip(half).map(|(q, h)| [q - h, q + h])
+    }
+
+    /// Names of the columns, low and high for every coordinate.
+    pub fn names(&self) -> impl Iterator<Item = String> {
+        self.coordinates.iter().flat_map(|name| ["low", "high"].map(|end| format!("{name}_{end}")))
+    }
+
+    /// The JSON form.
+    pub fn facts(&self) -> TubeFacts<'_> {
+        let n = self.coordinates.len();
+        let half_widths = self.coordinates.iter().enumerate().map(|(i, name)| {
+            (name.as_str(), self.tube.half_widths.iter().skip(i).step_by(n).copied().collect::<Vec<f64>>())
+        });
+        TubeFacts {
+            share: self.tube.share,
+            motions: self.tube.motions,
+            times: &self.tube.times,
+            half_widths: half_widths.collect(),
+        }
+    }
+
+    /// Describes the tube in words.
+    pub fn text(&self) -> String {
+        let [scaling, scored] = self.tube.motions;
+        format!("tube for {} of whole motions, from {} motions\n", self.tube.share, scaling + scored)
+    }
+}

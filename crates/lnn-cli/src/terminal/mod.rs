@@ -1,0 +1,10 @@
+//! What a command prints, how it ends, and the errors it ends with.
+
+pub mod error;
+pub mod format;
+pub mod interrupt;
+pub mod json;
+pub mod output;
+pub mod progress;
+pub mod result_page;
+pub mod watch;
