@@ -5,7 +5,7 @@
 //! after the last of them.
 
 use super::statistics::quantile;
-use super::thresholds::{STEPS_ANYWAY, STEPS_PER_SAMPLE, TIME_ROUNDING};
+use super::thresholds::{LEAST_STEPS, STEPS_PER_SAMPLE, TIME_ROUNDING};
 use super::{ValidTime, angle_difference, relative_error, valid_time};
 use crate::data::StateEstimate;
 use crate::lagrangian::EulerLagrange;
@@ -99,7 +99,7 @@ pub fn follow(
     let shortest = windows.iter().flat_map(|w| w.times.first().copied().into_iter().chain(steps(&w.times)));
     let step = shortest.fold(end, f64::min);
     // A little longer, so that rounding leaves the last sample of every window inside.
-    let max_steps = STEPS_ANYWAY + (STEPS_PER_SAMPLE * end / step) as usize;
+    let max_steps = LEAST_STEPS + (STEPS_PER_SAMPLE * end / step) as usize;
     let options = RolloutOptions::new(end * (1.0 + 1e-12), step).energy(false).max_steps(max_steps);
     let motions = rollout_each(model, &starts, &options, threads);
     let pairs = windows.iter().zip(motions);

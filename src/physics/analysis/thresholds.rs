@@ -115,7 +115,7 @@ pub(super) const INDEPENDENT_COLUMN: f64 = 1e-10;
 // ---- Predictions and tubes ----
 
 /// Steps that a predicted motion may always take: irregular ones would take a million.
-pub(super) const STEPS_ANYWAY: usize = 1000;
+pub(super) const LEAST_STEPS: usize = 1000;
 /// Further steps per sample of the windows; one step of a healthy motion covers several samples.
 pub(super) const STEPS_PER_SAMPLE: f64 = 4.0;
 /// Relative rounding error of times, and of counts that are computed from shares.

@@ -40,7 +40,7 @@ mod function;
 mod interval;
 mod models;
 mod number;
-mod says;
+mod report;
 mod search;
 mod spectrum;
 mod thresholds;

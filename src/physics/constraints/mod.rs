@@ -13,8 +13,8 @@ mod features;
 mod generators;
 mod pencil;
 mod regular;
+mod report;
 mod samples;
-mod says;
 #[cfg(test)]
 mod tests;
 mod thresholds;

@@ -101,7 +101,7 @@ impl Residuals {
         let still = |at: &usize| library.kinetic(kept(at)).is_none();
         let mut removed: Vec<usize> = path.order.iter().copied().filter(still).take(MOST_REMOVED_EFFECTS).collect();
         removed.extend(set.iter().filter(|at| still(at) && !path.order.contains(at)));
-        let shaken: Vec<usize> = library
+        let potentials: Vec<usize> = library
             .driven()
             .iter()
             .skip(library.n())
@@ -121,7 +121,7 @@ impl Residuals {
         };
         let mut errors = training(&errors);
         let others = remove(&mut errors, of(&removed)[0].iter().map(|column| training(column)));
-        let effects = of(&shaken);
+        let effects = of(&potentials);
         let effects = units.iter().chain(&effects[0]).map(|effect| training(effect));
         let driven = effects.map(|effect| Driven::new(&effect, &errors, &others, data.n)).collect();
         let times: Vec<f64> = used.iter().map(|&w| windows.centres[w]).collect();

@@ -85,8 +85,8 @@ impl Library {
     pub(super) fn driven(&self) -> Vec<Function> {
         let mut all: Vec<Function> = (0..self.n()).map(Function::coordinate).collect();
         let simple = |f: &&Function| f.is_smooth() && !f.is_one() && f.complexity() <= MOST_DRIVEN_COMPLEXITY;
-        let shaken = self.functions.iter().filter(simple).filter(|f| !all.contains(f)).cloned().collect::<Vec<_>>();
-        all.extend(shaken);
+        let others = self.functions.iter().filter(simple).filter(|f| !all.contains(f)).cloned().collect::<Vec<_>>();
+        all.extend(others);
         all
     }
 }

@@ -47,7 +47,7 @@ mod prepared;
 mod quotient;
 mod regress;
 mod regular;
-mod says;
+mod report;
 mod search;
 mod select;
 mod thresholds;

@@ -6,7 +6,9 @@ use super::determined::{Determined, OpenDirection};
 use super::invariants::{Invariant, Kind, products, sums};
 use super::linear::{inverse_with, times};
 use super::solve::{Normal, Problem};
-use super::thresholds::{EQUAL_FIT_INCREASE, MOVE, MOVED_DECREMENT, MOVED_HALVINGS, MOVED_ITERATIONS, RIDGE};
+use super::thresholds::{
+    CONFIRMING_FACTOR, EQUAL_FIT_INCREASE, MOVED_DECREMENT, MOVED_HALVINGS, MOVED_ITERATIONS, RIDGE,
+};
 use crate::lagrangian::system::Range;
 use crate::linalg::dot;
 
@@ -165,7 +167,7 @@ impl<'a> Moves<'a> {
     fn moves_of<'c>(&self, x: &[f64], columns: &[&'c OpenDirection]) -> Vec<Vec<(&'c OpenDirection, f64)>> {
         let factors = |column: &'c OpenDirection| {
             let far = self.determined.size[column.pivot] / x[column.pivot].abs();
-            [(column, MOVE.max(far.min(f64::MAX))), (column, MOVE.recip())]
+            [(column, CONFIRMING_FACTOR.max(far.min(f64::MAX))), (column, CONFIRMING_FACTOR.recip())]
         };
         let alone = columns.iter().copied().flat_map(|column| factors(column).map(|one| vec![one]));
         let all =
@@ -192,7 +194,7 @@ fn along(x: &[f64], moves: &[(&OpenDirection, f64)], kind: Kind) -> Vec<f64> {
                 Kind::Product if x != 0.0 => *moved *= factor.powf(change / x * pivot / own),
                 Kind::Product => {}
                 // The change is already as large as the size.
-                Kind::Sum => *moved += (factor.min(MOVE) - 1.0) * change,
+                Kind::Sum => *moved += (factor.min(CONFIRMING_FACTOR) - 1.0) * change,
             }
         }
     }

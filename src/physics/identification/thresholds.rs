@@ -85,7 +85,7 @@ pub(super) const NO_EFFECT_IN_SEARCH: f64 = 1e-26;
 /// interpolation of the forces: three standard deviations.
 pub(super) const EQUAL_FIT_INCREASE: f64 = 9.0;
 /// Factor by which constants are moved, up and down, to confirm a combination.
-pub(super) const MOVE: f64 = 2.0;
+pub(super) const CONFIRMING_FACTOR: f64 = 2.0;
 /// Factor in a sum, relative to the effect of the first constant, below which a constant does not take part in it: rounding.
 pub(super) const SUM_ROUNDING: f64 = 1e-5;
 /// Largest power of a constant in a product.

@@ -28,7 +28,7 @@ mod orbits;
 mod rays;
 #[cfg(feature = "training")]
 mod readings;
-mod says;
+mod report;
 mod shadow;
 mod sky;
 mod thresholds;
@@ -39,7 +39,7 @@ pub use coordinates::{CentralCoordinates, Chart};
 pub use rays::{Ray, RayOutcome, Tracing};
 #[cfg(feature = "training")]
 pub use readings::{LearnedHole, Reading};
-pub use says::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary};
+pub use report::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary};
 pub use shadow::{Edge, Outline, Shadow};
 pub use sky::{Image, Sky};
 pub use two_sided::TwoSided;

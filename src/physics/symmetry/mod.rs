@@ -40,8 +40,8 @@ mod conserved;
 mod field;
 mod find;
 mod null_space;
+mod report;
 mod sample;
-mod says;
 mod thresholds;
 
 pub use algebra::Algebra;
@@ -52,8 +52,8 @@ pub use conserved::{Conserved, Quadratic};
 pub use field::{Charge, Field};
 pub use find::Symmetries;
 pub use null_space::Separation;
+pub use report::{ComparisonSummary, QuadraticSummary, SymmetrySummary};
 pub use sample::{Invariant, Region};
-pub use says::{ComparisonSummary, QuadraticSummary, SymmetrySummary};
 
 // For the packages of this repository.
 #[doc(hidden)]

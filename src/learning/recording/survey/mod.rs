@@ -3,7 +3,7 @@
 mod coordinate;
 mod first_order;
 mod motionless;
-mod says;
+mod report;
 mod suspicious;
 mod thresholds;
 mod warnings;
