@@ -144,7 +144,7 @@ impl TrainReport {
         )
     }
 
-    /// Creates the record for an experiment; the trajectory test ended at `t_end`.
+    /// Creates the record of this run for an experiment whose trajectory test ends at `t_end`.
     pub(crate) fn record(&self, run: String, t_end: f64) -> Record {
         let motions = || self.evaluation.trajectories.iter().map(|motion| &motion.summary);
         let scale = &self.network.architecture().scale;

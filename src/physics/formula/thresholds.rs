@@ -138,9 +138,9 @@ pub(super) const MOST_FAMILY_DEGREE: usize = 6;
 pub(super) const MOST_LIBRARY_TERMS: usize = 400;
 /// Largest number of windows.
 pub(super) const MOST_WINDOWS: f64 = 4000.0;
-/// About how many windows are used to check the condition of mass matrices.
+/// Approximate number of windows in which the condition of mass matrices is checked.
 pub(super) const MASS_WINDOWS: usize = 200;
-/// About how many samples are used for the range of a coordinate.
+/// Approximate number of samples from which the range of a coordinate is computed.
 pub(super) const RANGE_SAMPLES: usize = 1 << 16;
 /// Usual number of states at which a model is evaluated.
 pub const MODEL_STATES: usize = 1500;

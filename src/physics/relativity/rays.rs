@@ -23,7 +23,7 @@ pub enum RayOutcome {
     Escaped([f64; 3]),
     /// It came from far away in the second region of a metric with [two sides](super::TwoSided): the place on the sky there.
     Crossed([f64; 3]),
-    /// Neither, within the steps allowed, or it reached a point where the metric is invalid.
+    /// It did not end within the allowed steps, or it reached a point where the metric is invalid.
     Unfinished,
 }
 

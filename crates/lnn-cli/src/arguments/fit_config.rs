@@ -97,8 +97,7 @@ impl Saved {
         Self { directory: std::env::current_dir().unwrap_or_default(), fit, text: String::new() }
     }
 
-    /// Its files relative to the present directory; unchanged in the directory in which it was started. Standard input has to be supplied
-    /// again.
+    /// The paths of its recordings, as seen from the present directory. Standard input has to be supplied again.
     fn files(&self) -> Vec<String> {
         let here = std::env::current_dir().is_ok_and(|here| here == self.directory);
         let found = |file: &String| {

@@ -14,9 +14,9 @@ use std::path::Path;
 
 /// A directory of a training or a fit.
 enum Found {
-    /// It can continue; the contents of its checkpoint.
+    /// The run can continue: the contents of its checkpoint.
     Unfinished(String),
-    /// It has finished; `config.toml` and `summary.json`.
+    /// The run has finished: the contents of `config.toml` and of `summary.json`.
     Finished(String, String),
 }
 

@@ -170,7 +170,7 @@ impl Data {
             .into_iter()
             .zip(&self.observed)
             .map(|(square, [size, _, independent])| {
-                // No number is known more accurately than its digits.
+                // Recorded numbers are rounded: a residual cannot be known to be smaller than their last digit.
                 let square = square.max(LEAST_SQUARE_RESIDUAL * size).max(f64::MIN_POSITIVE.sqrt());
                 independent / (square * self.states() as f64)
             })

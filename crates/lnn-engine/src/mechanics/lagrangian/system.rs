@@ -246,7 +246,7 @@ pub struct PaperPhase {
 }
 
 impl PaperPhase {
-    /// Returns a phase over the box of the training states.
+    /// Returns a phase whose positions are those of the training states.
     pub const fn new(epochs: usize, rate: f64, lowest_rate: f64) -> Self {
         Self { epochs, rate, lowest_rate, positions: None }
     }

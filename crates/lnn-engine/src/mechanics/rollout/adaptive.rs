@@ -35,7 +35,7 @@ impl<S: Scalar> MotionEquations<'_, S> {
         self.options.t_end < self.options.t0
     }
 
-    /// Returns the time for an elapsed time.
+    /// Returns the time at which this much time has elapsed since the start.
     fn time(&self, elapsed: S) -> S {
         time(self.options, elapsed)
     }

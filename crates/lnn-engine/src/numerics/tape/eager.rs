@@ -55,7 +55,7 @@ pub struct Tape<T> {
     peak: usize,
 }
 
-/// Room of a new tape, in nodes.
+/// Number of nodes for which a new tape has room.
 const FIRST_ROOM: u32 = 128;
 
 /// Sweeps nodes, the last one first: the weight of each goes to its arguments, which precede it. `values` are the adjoints up to the last

@@ -63,7 +63,7 @@ impl fmt::Display for Dd {
         f.write_str(&self.to_text())
     }
 }
-/// Methods of [`Real`] that are written next door under another name.
+/// Methods of [`Real`] that call inherent methods of another name.
 macro_rules! forward {
     ($($name:ident = $inner:ident;)*) => {$(
         #[inline]

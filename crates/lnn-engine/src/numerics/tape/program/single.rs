@@ -124,7 +124,7 @@ struct Fusion {
     uniform_rows: usize,
     /// Number of operations and outputs that read each row.
     readers: Vec<usize>,
-    /// Factors of each row that is a product with one reader.
+    /// The two factors of each row that is a product and has only one reader.
     products: Vec<Option<[u8; 2]>>,
     /// Rows whose product is computed by their reader.
     is_fused: Vec<bool>,
