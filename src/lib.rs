@@ -19,7 +19,7 @@
 //!
 //! | to | use |
 //! |---|---|
-//! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::System::all`] |
+//! | write a Lagrangian, or take one of the catalogue | [`lagrangian::Lagrangian`], [`lagrangian::System::unconstrained`] |
 //! | get `L`, `p`, `M`, `a`, `E` of states | [`lagrangian::EulerLagrange::terms`] |
 //! | compute the metric, connection and curvature at a point | [`geometry::Geometry::of`] |
 //! | integrate, with error control or symplectically | [`rollout::rollout`], [`rollout::rollout_many`] |

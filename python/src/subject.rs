@@ -56,7 +56,7 @@ pub struct Subject {
 /// All systems of the catalogue, as JSON.
 #[pyfunction]
 pub fn systems() -> PyResult<String> {
-    let free = lnn::lagrangian::System::all().iter().map(Cow::Borrowed);
+    let free = lnn::lagrangian::System::unconstrained().iter().map(Cow::Borrowed);
     let all: PyResult<Vec<Value>> = free
         .chain(constrained_systems().into_iter().map(Cow::Owned))
         .map(|system| Ok(Subject::of(SystemInstance::new(system, &[]).map_err(value)?)?.summary()))
@@ -769,9 +769,7 @@ impl Subject {
         let found = whole(py, progress.as_ref(), |watch| Evaluation::of(&system, network, options, watch))?;
         serde_json::to_string(&found.map_err(pipeline)?).map_err(runtime)
     }
-}
 
-impl Subject {
     /// Both arrays of states as slices.
     pub fn states<'a>(
         &self,

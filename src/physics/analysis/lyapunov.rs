@@ -25,9 +25,7 @@ impl Lyapunov {
     pub fn is_chaotic(&self) -> bool {
         self.exponent * self.time >= REGULAR + (self.time / REGULAR_TIME).ln().max(0.0)
     }
-}
 
-impl Lyapunov {
     /// Largest finite-time Lyapunov exponent of the motion from `(q, v)` by two nearby trajectories.
     ///
     /// The neighbour starts at the relative distance `sqrt(eps)` and is pulled back to it after every `options.dt` (Benettin et al. 1980); the

@@ -250,9 +250,7 @@ impl Certificate {
         let bounds = checked(lagrangian.coordinates(), region, options)?;
         Ok(certificate(&Source::new(lagrangian, parameters), vec![(bounds, 1.0)], options))
     }
-}
 
-impl Certificate {
     /// As [`Certificate::of`], for a system from the catalogue or from its description.
     ///
     /// # Errors

@@ -87,7 +87,7 @@ impl LagrangianVisitor for Check<'_> {
 
 #[test]
 fn systems_are_enclosed() {
-    for system in crate::lagrangian::System::all() {
+    for system in crate::lagrangian::System::unconstrained() {
         let configured = crate::lagrangian::SystemInstance::<f64>::named(&system.name, &[]).unwrap();
         configured.visit(Check(&configured)).unwrap();
     }

@@ -110,9 +110,7 @@ impl<S: Scalar> Geometry<S> {
         }
         Ok(rounded)
     }
-}
 
-impl<S: Scalar> Geometry<S> {
     /// The geometry of a model at points `(batch, n)` in physical units, each with its own failure.
     ///
     /// `velocity`, `(n)`, is the one at which the mass matrix is taken: zeros unless `L` is more than quadratic in the velocities.

@@ -175,9 +175,7 @@ impl Outline {
     pub(crate) fn bottom(&self) -> Edge {
         self.quarter(3)
     }
-}
 
-impl Outline {
     /// Finds the edge of the shadow, or of the second region, in directions around the centre of the picture, to `pi/2^30` of an angle and the
     /// error of rays a hundred times as accurate as those of a picture; `None` if the ray of the centre is not captured.
     ///

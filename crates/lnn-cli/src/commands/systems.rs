@@ -26,7 +26,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         Some(system) => vec![system],
         None => {
             let constrained = constrained_systems().into_iter().map(Cow::Owned);
-            System::all().iter().map(Cow::Borrowed).chain(constrained).collect()
+            System::unconstrained().iter().map(Cow::Borrowed).chain(constrained).collect()
         }
     };
     if args.json {

@@ -45,9 +45,7 @@ impl Guess {
             LoadedRecording::read(files, &self.columns)
         })
     }
-}
 
-impl Guess {
     /// Guesses the meaning of the columns in the first of some files, where `given` does not state it.
     ///
     /// A given time, rate, trajectory, force, velocity or acceleration is kept; given angles and units are added to the guessed ones.

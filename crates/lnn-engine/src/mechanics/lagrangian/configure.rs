@@ -136,12 +136,10 @@ pub trait LagrangianVisitor {
 
 impl System {
     /// Returns all systems without constraints; `constrained_systems` returns the others.
-    pub fn all() -> &'static [System] {
+    pub fn unconstrained() -> &'static [System] {
         SYSTEMS
     }
-}
 
-impl System {
     /// Returns the system with a name.
     ///
     /// # Errors
@@ -439,9 +437,7 @@ impl<S: Scalar> SystemInstance<S> {
     pub fn named(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
         SystemInstance::new(resolve(name)?, given)
     }
-}
 
-impl<S: Scalar> SystemInstance<S> {
     /// Does the same as [`SystemInstance::named`] for a given system, either from the catalogue or from a [description](super::Description).
     ///
     /// # Errors
@@ -460,9 +456,7 @@ impl<S: Scalar> SystemInstance<S> {
             |symbol| text(symbol).map(|text| (S::parse(text), text.to_string())),
         )
     }
-}
 
-impl<S: Scalar> SystemInstance<S> {
     /// Does the same as [`SystemInstance::new`] for values that are already numbers.
     ///
     /// # Errors
@@ -548,7 +542,7 @@ mod tests {
 
     #[test]
     fn every_entry_is_complete() {
-        for system in System::all() {
+        for system in System::unconstrained() {
             let n = system.size.default();
             let configured = SystemInstance::<f64>::named(&system.name, &[]).unwrap();
             assert_eq!(configured.build().unwrap().coordinates(), n);
@@ -627,7 +621,7 @@ mod tests {
 
     #[test]
     fn places_are_finite_and_no_larger_than_the_system() {
-        for system in System::all() {
+        for system in System::unconstrained() {
             let n = system.size.default();
             let configured = SystemInstance::<f64>::named(&system.name, &[]).unwrap();
             let bounds = system.training(n).positions;

@@ -196,9 +196,7 @@ impl<S: Scalar> Terms<S> {
             outcome.map(|()| Vec::new())
         }
     }
-}
 
-impl<S: Scalar> Terms<S> {
     /// Does the same as [`Terms::complete`] for a wrapper that has drained the failures of the inner model before.
     ///
     /// # Errors

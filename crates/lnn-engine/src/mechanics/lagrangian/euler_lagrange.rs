@@ -142,9 +142,7 @@ impl<S: Scalar> Terms<S> {
         self.prepend_failures(found);
         self.outcome()
     }
-}
 
-impl<S: Scalar> Terms<S> {
     /// Adds external forces, `(batch, n)`, to terms that were computed with [`Request::ACCELERATION`] without a failure: adds `M^-1 Q` to
     /// the accelerations, `Q` to the forces and `-v.Q` to the dissipated power.
     ///

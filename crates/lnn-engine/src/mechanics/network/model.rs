@@ -133,9 +133,7 @@ impl Architecture {
         self.form.check(n, self.time_like).map_err(NetworkError::Architecture)?;
         Ok(())
     }
-}
 
-impl Architecture {
     /// Returns `true` if there is any friction.
     pub fn has_friction(&self) -> bool {
         let known = self.form.known.as_ref().is_some_and(|known| known.dissipation.is_some());

@@ -221,9 +221,7 @@ impl<S: Scalar> Samples<S> {
     pub(super) fn elapsed(&self, k: usize) -> S {
         if k < self.regular { S::of_f64(k as f64) * self.step } else { (self.t_end - self.t0).abs() }
     }
-}
 
-impl<S: Scalar> Samples<S> {
     /// Returns the number of samples whose elapsed time is at most `end`.
     pub(super) fn count_until(&self, end: S) -> usize {
         let (mut low, mut high) = (0, self.len());

@@ -50,7 +50,7 @@ impl Description {
     /// The first invalid key and the problem.
     pub fn system(&self) -> Outcome<System> {
         let taken = constrained_description(&self.name);
-        if System::all().iter().any(|system| system.name == self.name)
+        if System::unconstrained().iter().any(|system| system.name == self.name)
             || taken.is_some_and(|description| description != *self)
         {
             let problem = format!("{} is a system of the catalogue, expected another name", self.name);

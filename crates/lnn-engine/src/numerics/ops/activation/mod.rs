@@ -122,9 +122,7 @@ impl Activation {
         let mean = mean * STEP / (2.0 * core::f64::consts::PI).sqrt();
         mean.sqrt().recip()
     }
-}
 
-impl Activation {
     /// Value and four derivatives at `x`: `[f, f', f'', f''', f'''']`.
     ///
     /// Closed forms, each accurate to a few units of rounding times its own condition number `1 + |x f^(k+1) / f^(k)|`,
