@@ -64,9 +64,6 @@ impl FunctionColumns {
 }
 
 impl Symmetries {
-    /// Noise of exact terms, the tolerance for a Lagrangian written down.
-    pub const EXACT: f64 = super::thresholds::EXACT;
-
     /// Finds the point symmetries of a Lagrangian whose fields are made of a basis.
     ///
     /// A field `xi(q)` is a symmetry if `xi.dL/dq + (D xi v).dL/dv = dF/dt` for a gauge function `F(q)`: its flow changes `L` by a total

@@ -3,10 +3,14 @@
 //! The rows "conserved" of `lnn-studies rates --part readings` count how often charges and energies are rightly called conserved;
 //! `docs/verdicts.md` states the rates.
 
+use super::Symmetries;
+
 // ---- Singular values that count as zero ----
 
-/// Noise of exact terms: singular values below it are zero.
-pub(super) const EXACT: f64 = 1e-8;
+impl Symmetries {
+    /// Noise of the terms of a Lagrangian written down: singular values below it are zero.
+    pub const EXACT: f64 = 1e-8;
+}
 /// Largest value that may be meant to be zero if the noise is unknown: a tenth of its size without a symmetry.
 pub(super) const MOST_ZERO_VALUE: f64 = 0.1;
 /// Tolerances that can be used: from the rounding of a number near 1 to the largest value that may be meant to be zero.

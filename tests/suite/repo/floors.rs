@@ -32,7 +32,7 @@ const ADAPTERS: [(&str, &[&str]); 15] = [
     ("flate2", &["app/report/plot/png.rs", "learning/recording/read/gzip.rs"]),
     ("roxmltree", &["app/pipeline/robot/"]),
     ("clap", &["cli/"]),
-    ("signal_hook", &["cli/interrupt.rs"]),
+    ("signal_hook", &["cli/terminal/interrupt.rs"]),
 ];
 
 /// Position of a module in the order.
