@@ -769,7 +769,9 @@ impl Subject {
         let found = whole(py, progress.as_ref(), |watch| Evaluation::of(&system, network, options, watch))?;
         serde_json::to_string(&found.map_err(pipeline)?).map_err(runtime)
     }
+}
 
+impl Subject {
     /// Both arrays of states as slices.
     pub fn states<'a>(
         &self,

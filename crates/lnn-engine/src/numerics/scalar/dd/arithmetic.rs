@@ -59,7 +59,9 @@ impl Dd {
         let rest = self.high.mul_add(other, -high);
         Self::fast_sum(high, self.low.mul_add(other, rest))
     }
+}
 
+impl Dd {
     /// The result of an algorithm, or `plain`, the result of `f64`, if it is not finite.
     #[inline(always)]
     fn finite_or(self, plain: f64) -> Self {
