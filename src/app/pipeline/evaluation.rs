@@ -133,7 +133,7 @@ impl Evaluation {
         network: &NetworkLagrangian<f64>,
         options: EvaluationOptions,
         watch: &Watch,
-    ) -> Result<Evaluation, PipelineError> {
+    ) -> Result<Self, PipelineError> {
         let judging = &Judging::new(watch, EVALUATION_PIECES);
         let (n, span) = (system.coordinates, &options.span);
         system.require_states()?;

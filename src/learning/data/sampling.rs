@@ -29,7 +29,7 @@ impl Dataset<f64> {
         bounds: (&[[f64; 2]], &[[f64; 2]]),
         states: usize,
         rng: &mut impl Rng,
-    ) -> Result<Dataset<f64>, SamplingError> {
+    ) -> Result<Self, SamplingError> {
         fill(Drawn::new(system)?, field, bounds, &[], states, (rng, &AtomicBool::new(false)))
     }
 }
@@ -86,7 +86,7 @@ impl<S: Scalar> Datasets<S> {
     ///
     /// # Errors
     /// [`SamplingError`].
-    pub fn sample(config: &Config, system: &SystemInstance<f64>) -> Result<(Datasets<S>, Vec<f64>), SamplingError> {
+    pub fn sample(config: &Config, system: &SystemInstance<f64>) -> Result<(Self, Vec<f64>), SamplingError> {
         sample_all_until(config, system, &AtomicBool::new(false))
     }
 }

@@ -33,7 +33,7 @@ impl EnergyError {
     ///
     /// `scale`, in units of energy, keeps the quotient meaningful where `E(0)` is near 0; a natural choice is the kinetic
     /// energy of a typical state.
-    pub fn of<S: Scalar>(exact: &dyn EulerLagrange<S>, trajectory: &Trajectory<S>, scale: S) -> EnergyError {
+    pub fn of<S: Scalar>(exact: &dyn EulerLagrange<S>, trajectory: &Trajectory<S>, scale: S) -> Self {
         normalised(trajectory, &trajectory.energy_by(exact), scale)
     }
 }

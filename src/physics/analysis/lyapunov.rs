@@ -42,7 +42,7 @@ impl Lyapunov {
         q: &[S],
         v: &[S],
         options: &RolloutOptions<S>,
-    ) -> Result<Lyapunov, RolloutError> {
+    ) -> Result<Self, RolloutError> {
         let main = rollout(model, q, v, &options.clone().energy(false)).complete()?;
         let n = main.coordinates;
         let size = |state: &[f64]| state.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -94,7 +94,7 @@ pub(crate) fn nearest_factor(size: usize, exact: &[f64], learned: &[f64]) -> f64
 
 impl MassMatrixError {
     /// Compares the matrices at rest at the positions `q`, `(states, n)`.
-    pub fn of<S: Scalar>(exact: &dyn EulerLagrange<S>, learned: &dyn EulerLagrange<S>, q: &[S]) -> MassMatrixError {
+    pub fn of<S: Scalar>(exact: &dyn EulerLagrange<S>, learned: &dyn EulerLagrange<S>, q: &[S]) -> Self {
         let n = exact.coordinates();
         let (of_exact, mut of_learned) = (matrices_at_rest(exact, q), matrices_at_rest(learned, q));
         // Any velocities that show which coordinates act on which.

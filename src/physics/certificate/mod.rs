@@ -246,7 +246,7 @@ impl Certificate {
         parameters: &[S],
         region: &Bounds,
         options: &CertificateOptions<'_>,
-    ) -> Result<Certificate, CertificateError> {
+    ) -> Result<Self, CertificateError> {
         let bounds = checked(lagrangian.coordinates(), region, options)?;
         Ok(certificate(&Source::new(lagrangian, parameters), vec![(bounds, 1.0)], options))
     }
@@ -259,7 +259,7 @@ impl Certificate {
         configured: &SystemInstance<S>,
         region: &Bounds,
         options: &CertificateOptions<'_>,
-    ) -> Result<Certificate, CertificateError> {
+    ) -> Result<Self, CertificateError> {
         struct Certify<'a, S>(&'a [S], &'a Bounds, &'a CertificateOptions<'a>);
         impl<S: Scalar> LagrangianVisitor for Certify<'_, S> {
             type Output = Result<Certificate, CertificateError>;

@@ -27,7 +27,7 @@ impl Certificate {
         network: &NetworkLagrangian<S>,
         region: &Bounds,
         options: &CertificateOptions<'_>,
-    ) -> Result<Certificate, CertificateError> {
+    ) -> Result<Self, CertificateError> {
         let architecture = network.architecture();
         let bounds = checked(architecture.coordinates, region, options)?;
         let by_construction = signature_by_construction(architecture) == Some(options.signature);

@@ -163,7 +163,7 @@ impl FoundConstraints {
     ///
     /// # Errors
     /// [`ConstraintSearchError`] for too many terms or too few samples.
-    pub fn of(samples: &MotionSamples, search: ConstraintSearch) -> Result<FoundConstraints, ConstraintSearchError> {
+    pub fn of(samples: &MotionSamples, search: ConstraintSearch) -> Result<Self, ConstraintSearchError> {
         let (of_positions, of_velocities, mut cut_short) = searched_terms(samples, search)?;
         let mut held = RowsTaken::at(samples, GRADIENT_STATES);
         let stop = &samples.cancellation;

@@ -41,7 +41,7 @@ impl FoundFormula {
         (names, periodic): (&[String], &[bool]),
         (q, v): (&[f64], &[f64]),
         options: &FormulaOptions,
-    ) -> Result<FoundFormula, FormulaError> {
+    ) -> Result<Self, FormulaError> {
         let families = options.families.unwrap_or_default();
         let friction = if options.friction { Friction::Constant } else { Friction::None };
         let extent = Extent { families, gyroscopic: options.gyroscopic, friction, drive: None };

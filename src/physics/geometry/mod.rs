@@ -123,7 +123,7 @@ impl<S: Scalar> Geometry<S> {
         model: &dyn EulerLagrange<S>,
         points: &[S],
         velocity: &[S],
-    ) -> Result<Vec<Result<Geometry<S>, GeometryError>>, GeometryError> {
+    ) -> Result<Vec<Result<Self, GeometryError>>, GeometryError> {
         let n = model.coordinates();
         if n > MOST_COORDINATES {
             return Err(GeometryError::TooMany { found: n, most: MOST_COORDINATES });

@@ -114,7 +114,7 @@ impl<S: Scalar> Surface<S> {
         (from, to): (&[S], &[S]),
         velocity: &[S],
         steps: usize,
-    ) -> Result<Vec<Surface<S>>, GeometryError> {
+    ) -> Result<Vec<Self>, GeometryError> {
         let n = model.coordinates();
         for (what, end) in [("start of the line", from), ("end of the line", to)] {
             super::expect_length(what, n, end.len())?;

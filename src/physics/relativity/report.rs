@@ -40,7 +40,7 @@ impl View {
         stop: &AtomicBool,
         begin: &dyn Fn(&str),
         advance: &(dyn Fn(usize) + Sync),
-    ) -> Result<Vec<View>, RelativityError> {
+    ) -> Result<Vec<Self>, RelativityError> {
         let mut views = Vec::new();
         for (name, model) in metrics {
             if stop.load(Ordering::Relaxed) {

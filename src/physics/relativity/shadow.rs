@@ -43,7 +43,7 @@ impl Shadow {
         camera: &Camera,
         tracing: &Tracing,
         progress: &(dyn Fn(usize) + Sync),
-    ) -> Result<Shadow, RelativityError> {
+    ) -> Result<Self, RelativityError> {
         let tetrad = Tetrad::new(model, camera)?;
         let Camera { chart, width, height, .. } = *camera;
         let start = |pixel: usize| {
@@ -188,7 +188,7 @@ impl Outline {
         camera: &Camera,
         tracing: &Tracing,
         directions: usize,
-    ) -> Result<Option<Outline>, RelativityError> {
+    ) -> Result<Option<Self>, RelativityError> {
         expect(directions > 0, "directions", "at least 1", directions as f64)?;
         let tetrad = Tetrad::new(model, camera)?;
         let count = directions.next_multiple_of(4);

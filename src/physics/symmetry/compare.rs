@@ -62,7 +62,7 @@ impl Comparison {
         b: &dyn EulerLagrange<f64>,
         basis: &Basis,
         (q, v): (&[f64], &[f64]),
-    ) -> Result<Comparison, SymmetryError> {
+    ) -> Result<Self, SymmetryError> {
         if a.coordinates() != b.coordinates() || basis.names().len() != b.coordinates() {
             let found = if a.coordinates() == b.coordinates() { basis.names().len() } else { a.coordinates() };
             return Err(SymmetryError::Basis { expected: b.coordinates(), found });

@@ -118,7 +118,7 @@ impl Quadratic {
         fields: &[Field],
         (q, v): (&[f64], &[f64]),
         tolerance: Option<f64>,
-    ) -> Result<Quadratic, SymmetryError> {
+    ) -> Result<Self, SymmetryError> {
         let n = model.coordinates();
         check(tolerance)?;
         if basis.names().len() != n {

@@ -185,7 +185,7 @@ impl Charge {
         basis: &Basis,
         fields: &[Field],
         motion: &Trajectory<f64>,
-    ) -> Result<Vec<Charge>, SymmetryError> {
+    ) -> Result<Vec<Self>, SymmetryError> {
         let n = model.coordinates();
         for found in [basis.names().len(), motion.coordinates] {
             if found != n {

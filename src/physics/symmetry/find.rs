@@ -84,7 +84,7 @@ impl Symmetries {
         basis: &Basis,
         (q, v): (&[f64], &[f64]),
         tolerance: Option<f64>,
-    ) -> Result<Symmetries, SymmetryError> {
+    ) -> Result<Self, SymmetryError> {
         let n = model.coordinates();
         check(tolerance)?;
         if basis.names().len() != n {

@@ -150,7 +150,7 @@ impl Args {
 
     /// Distance of the sky.
     fn far(&self) -> f64 {
-        let camera = Camera::new(self.distance, self.inclination.to_radians());
+        let camera = self.camera(Chart::default());
         let usual = if self.model.is_none() { camera.sky_of_exact() } else { camera.sky_of_learned() };
         self.far.unwrap_or(usual)
     }

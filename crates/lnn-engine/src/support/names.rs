@@ -282,6 +282,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn long_lists_end_with_the_number_of_the_others() {
+        let items = ["a", "b", "c", "d"];
+        assert_eq!(first_few(&items, 2, ", "), "a, b and 2 more");
+        assert_eq!(first_few(&items, 3, "; "), "a; b; c; and 1 more");
+        assert_eq!(first_few(&items, 4, ", "), "a, b, c, d");
+        assert_eq!(first_few(&items[..0], 4, ", "), "");
+    }
+
+    #[test]
     fn edits_are_counted() {
         let distance = |a: &str, b: &str| edits(&a.chars().collect::<Vec<_>>(), &b.chars().collect::<Vec<_>>());
         assert_eq!(distance("", "abc"), 3);

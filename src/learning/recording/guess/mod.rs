@@ -52,7 +52,7 @@ impl Guess {
     ///
     /// # Errors
     /// [`DataError`] for a file that cannot be read as a table, or in which no column can be a coordinate or the time.
-    pub fn of<P: AsRef<Path>>(files: &[P], given: &Columns) -> Result<Guess, DataError> {
+    pub fn of<P: AsRef<Path>>(files: &[P], given: &Columns) -> Result<Self, DataError> {
         if given.wide {
             return Err(
                 ColumnsError(vec!["coords: expected the columns of the coordinates beside wide".to_string()]).into()

@@ -59,7 +59,7 @@ impl LoadedRecording {
     ///
     /// # Errors
     /// [`DataError`], naming the file and, where there is one, row and column; several mistakes in the rows of a file at once.
-    pub fn read<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<LoadedRecording, DataError> {
+    pub fn read<P: AsRef<Path>>(paths: &[P], columns: &Columns) -> Result<Self, DataError> {
         if let Some((formulas, plain)) = ForceFormulas::of(columns)? {
             let mut reading = LoadedRecording::read(paths, &plain)?;
             formulas.apply(columns, &mut reading)?;

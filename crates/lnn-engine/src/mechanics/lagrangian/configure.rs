@@ -144,7 +144,7 @@ impl System {
     ///
     /// # Errors
     /// [`SystemError::UnknownSystem`], which suggests the nearest name.
-    pub fn named(name: &str) -> Result<&'static System, SystemError> {
+    pub fn named(name: &str) -> Result<&'static Self, SystemError> {
         SYSTEMS.iter().find(|system| system.name == name).ok_or_else(|| unknown_system(name))
     }
 }
@@ -434,15 +434,15 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// [`SystemError`] for an unknown name or symbol, a repeated symbol, or a value that is not a number or out of range.
-    pub fn named(name: &str, given: &Given) -> Result<SystemInstance<S>, SystemError> {
-        SystemInstance::new(resolve(name)?, given)
+    pub fn named(name: &str, given: &Given) -> Result<Self, SystemError> {
+        Self::new(resolve(name)?, given)
     }
 
     /// Does the same as [`SystemInstance::named`] for a given system, either from the catalogue or from a [description](super::Description).
     ///
     /// # Errors
     /// [`SystemError`] for an unknown or repeated symbol, or a value that is not a number or out of range.
-    pub fn new(system: Cow<'static, System>, given: &Given) -> Result<SystemInstance<S>, SystemError> {
+    pub fn new(system: Cow<'static, System>, given: &Given) -> Result<Self, SystemError> {
         for (i, (symbol, _)) in given.iter().enumerate() {
             require_symbol(&system, symbol)?;
             if given[..i].iter().any(|(earlier, _)| earlier == symbol) {
@@ -461,10 +461,7 @@ impl<S: Scalar> SystemInstance<S> {
     ///
     /// # Errors
     /// [`SystemError`] for an unknown symbol or a value out of range.
-    pub fn with_values(
-        system: Cow<'static, System>,
-        values: &BTreeMap<String, f64>,
-    ) -> Result<SystemInstance<S>, SystemError> {
+    pub fn with_values(system: Cow<'static, System>, values: &BTreeMap<String, f64>) -> Result<Self, SystemError> {
         values.keys().try_for_each(|symbol| require_symbol(&system, symbol))?;
         let whole = |x: f64| (x >= 0.0 && x.fract() == 0.0).then_some(x as usize);
         assemble(

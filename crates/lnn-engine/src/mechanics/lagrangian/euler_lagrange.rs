@@ -239,7 +239,7 @@ impl<S: Scalar> InverseDynamics<S> {
     ///
     /// # Errors
     /// [`MechanicsError`] of the model; also if the accelerations have another shape or are not finite.
-    pub fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], a: &[S]) -> Result<InverseDynamics<S>, MechanicsError> {
+    pub fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], a: &[S]) -> Result<Self, MechanicsError> {
         inverse_dynamics_by_drives(model, &[], [q, v, a])
     }
 }
@@ -279,7 +279,7 @@ impl<S: Scalar> ForceParts<S> {
     ///
     /// # Errors
     /// Those of [`InverseDynamics::of`].
-    pub fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], a: &[S]) -> Result<ForceParts<S>, MechanicsError> {
+    pub fn of(model: &dyn EulerLagrange<S>, q: &[S], v: &[S], a: &[S]) -> Result<Self, MechanicsError> {
         let (parts, failures) = force_parts_by_rows(model, [q, v, a], &[])?;
         failures.first().map_or(Ok(parts), |&error| Err(error))
     }
