@@ -200,6 +200,8 @@ pub use lnn_engine::{forward, names, ops};
 pub use physics::certificate;
 #[cfg(feature = "data")]
 pub use physics::constraints;
+#[cfg(feature = "data")]
+pub(crate) use physics::digits;
 pub use physics::geometry;
 #[cfg(feature = "training")]
 pub use physics::{analysis, formula, identification};

@@ -17,6 +17,8 @@ pub mod analysis;
 pub mod certificate;
 #[cfg(feature = "data")]
 pub mod constraints;
+#[cfg(feature = "data")]
+pub(crate) mod digits;
 #[cfg(feature = "training")]
 pub mod formula;
 pub mod geometry;

@@ -17,7 +17,6 @@ mod terminal;
 mod thresholds;
 
 pub use arguments::config::parse as parse_config;
-pub use arguments::states::{States, StatesError, parse_states};
 use arguments::{fit_config, train_config};
 use commands::{
     certify, check, compare, constraints, evaluate, fit, formula, geometry, identify, inspect, manual, page, rollout,

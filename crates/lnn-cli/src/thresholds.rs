@@ -2,10 +2,8 @@
 
 use std::time::Duration;
 
-// Thresholds below which a value counts as zero or as too small.
+// Thresholds below which a value counts as too small.
 
-/// An eigenvalue below this many roundings of the largest one counts as zero.
-pub const ROUNDINGS_OF_ZERO: f64 = 1024.0;
 /// Times that differ by less than this share of the duration are equal.
 pub const ROUNDING_OF_TIMES: f64 = 1e-9;
 /// Least width of a range of states relative to its larger end: over a narrower range, the functions of a column cannot be distinguished
@@ -27,8 +25,6 @@ pub const MAX_STATES_BYTES: u64 = 1 << 28;
 pub const ROWS_AT_ONCE: usize = 256;
 /// Numbers of the matrices of states evaluated together: 8 MB for each matrix in double precision.
 pub const NUMBERS_AT_ONCE: usize = 1 << 20;
-/// Largest number of parameters whose derivatives are shown: those of systems, not the weights of networks.
-pub const MOST_SHOWN_PARAMETERS: usize = 256;
 /// Largest number of coordinates of a metric, whose curvature has `n^4` components.
 pub const MOST_METRIC_COORDINATES: usize = 64;
 /// Largest number of intervals on a line: seconds of work for a metric that is a formula.
@@ -50,8 +46,8 @@ pub const SPOOL_ATTEMPTS: usize = 100;
 
 // Numbers of examined states.
 
-/// States of a file, or of a motion, at which constraints and conserved quantities are examined: a few suffice, because a property that
-/// does not hold fails at almost every state.
+/// States of a file at which the constraints of a model are examined: a few suffice, because constraints that depend on each other do so at
+/// almost every state.
 pub const EXAMINED_MOTION_STATES: usize = 24;
 /// Seed of the states on which the symmetries of a roll-out are sought.
 pub const CHARGES_SEED: u64 = 0;
@@ -66,10 +62,6 @@ pub const FARTHEST: f64 = 1e15;
 
 // What is shown.
 
-/// Number of points above which every second point of a curve is left out: more than the pixels across a picture.
-pub const MOST_CURVE_POINTS: usize = 4000;
-/// Largest number of events that are printed; a file contains all of them.
-pub const SHOWN_EVENTS: usize = 20;
 /// Largest number of file names, or of differences, in one line of a message.
 pub const SHOWN_NAMES: usize = 4;
 /// Longest name of a system that becomes the name of a directory, in bytes; file systems allow 255.

@@ -22,7 +22,9 @@ use crate::pipeline::thresholds::{
 use crate::recording::Recording;
 use crate::report::Figure;
 use crate::rollout::{Domain, Trajectory};
-use crate::symmetry::{Chart, Degrees, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns};
+use crate::symmetry::{
+    ChargeDrift, Chart, Degrees, Region, Symmetries, bases, drifts, enough, middle, most_symmetries, unknowns,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -62,21 +64,6 @@ impl FoundSymmetries {
             basis: degrees.to_string(),
         }
     }
-}
-
-/// Drift of a charge that the exact system has, along the learned motion.
-#[derive(Clone, Debug, Serialize)]
-pub struct ChargeDrift {
-    /// `energy`, or `g(v, v)/2` along geodesics of a metric with a time, or the field whose charge it is.
-    pub symmetry: String,
-    /// Charge at the start.
-    pub start: f64,
-    /// Charge at the end less that at the start, the sum of the next two.
-    pub drift: f64,
-    /// Drift caused by the model, whose acceleration is not exact.
-    pub by_model: f64,
-    /// Remaining drift, caused by the integrator.
-    pub by_integrator: f64,
 }
 
 /// Shares of the region in which the mass matrix is proven to have a signature, or proven not to have it.
@@ -347,19 +334,8 @@ impl Physics {
             Ok(all) => all,
             Err(problem) => return self.left_out.push(format!("drift of charges: {problem}")),
         };
-        let fields = found.fields.iter().map(|field| field.text(&found.basis));
-        let names = std::iter::once(found.invariant.charge().to_string()).chain(fields);
         self.charges_until = motion.t.last().copied().unwrap_or(0.0);
-        self.charges = names
-            .zip(&all)
-            .map(|(symmetry, charge)| ChargeDrift {
-                symmetry,
-                start: charge.values[0],
-                drift: charge.drift,
-                by_model: charge.by_model,
-                by_integrator: charge.by_integrator,
-            })
-            .collect();
+        self.charges = found.drifts(&all);
     }
 
     fn find_certificate(&mut self, subject: &Subject<'_>, region: &Region) {

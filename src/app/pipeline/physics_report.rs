@@ -3,6 +3,7 @@
 use crate::names::{number, rounded};
 use crate::pipeline::physics::{FoundSymmetries, Physics};
 use crate::report::Report;
+use crate::symmetry::ChargeDrift;
 
 /// Shown if there is no number.
 const NONE: &str = "-";
@@ -84,18 +85,11 @@ impl Physics {
         if self.charges.is_empty() {
             return report;
         }
-        let rows: Vec<Vec<String>> = self
-            .charges
-            .iter()
-            .map(|charge| {
-                let drifts = [charge.drift, charge.by_model, charge.by_integrator].map(number);
-                [vec![charge.symmetry.clone(), rounded(charge.start, 6)], drifts.to_vec()].concat()
-            })
-            .collect();
+        let rows: Vec<Vec<String>> = self.charges.iter().map(ChargeDrift::row).collect();
         let until = number(self.charges_until);
         report
             .paragraph(&format!("Charges of the exact system along the learned motion of start 1, until {until}:"))
-            .table(&["charge of", "start", "drift", "by the model", "by the integrator"], &rows)
+            .table(&ChargeDrift::HEADERS, &rows)
     }
 
     fn certificate(&self, report: Report) -> Report {

@@ -6,9 +6,11 @@ mod experiment;
 mod grids;
 mod html;
 mod identification;
+mod motion;
 mod page;
 mod plane;
 mod plot;
+mod systems;
 mod table;
 mod thresholds;
 
@@ -20,12 +22,14 @@ pub use grids::{Fit, GridComparison, grid_figures};
 pub use grids::{QuantityMap, Turn, quantity_figure};
 pub use html::Report;
 pub use identification::{formula_figures, identification_figures};
+pub use motion::{EventTable, Leaving, MotionRecord, MotionSummary, MotionTexts};
 pub use page::{PageError, page};
 pub use plane::Polar;
 pub use plot::{
     HeatMap, Level, LinePlot, OrbitPlot, Picture, PlotError, Series, Trace, heat_maps, line_plot, orbit_picture, png,
     trace_plot,
 };
+pub use systems::SystemEntry;
 pub use table::DataTable;
 
 /// One picture of a report.

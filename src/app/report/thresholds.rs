@@ -14,6 +14,10 @@ pub(super) const DRAWN_STARTS: usize = 7;
 pub(super) const DRAWN_COORDINATES: usize = 8;
 /// Largest number of points of a line.
 pub(super) const LINE_POINTS: usize = 4000;
+/// Number of points above which every second point of a motion is left out: more than the pixels across a picture.
+pub(super) const MOST_CURVE_POINTS: usize = 4000;
+/// Largest number of events in a table for people; a file contains all of them.
+pub(super) const SHOWN_EVENTS: usize = 20;
 /// Largest lag of an autocorrelation, in samples.
 pub(super) const DRAWN_LAGS: usize = 40;
 
@@ -25,5 +29,7 @@ pub(super) const BEYOND_VALID: f64 = 4.0;
 pub(super) const CROSSING_SECONDS: f64 = 20.0;
 /// Number of states at which a start on the constraints is sought.
 pub(super) const EXAMINED_STARTS: usize = 24;
+/// Largest number of states of a motion at which its invariant is sought: a quantity that is not conserved changes at almost every state.
+pub(super) const INVARIANT_STATES: usize = 24;
 /// Number of states at which mass matrices are compared.
 pub(super) const COMPARED_STATES: usize = 200;

@@ -50,6 +50,6 @@ pub use units::factor;
 pub use {
     clock::Clock,
     columns::{TIME, formula_in},
-    read::{Separator, comment, line_end, names_in, split},
+    read::{NumberTable, NumberTableError},
     survey::{FirstOrder, Survey, SurveyOptions, survey},
 };

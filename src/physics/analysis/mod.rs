@@ -24,6 +24,7 @@ mod energy;
 mod grid;
 mod lyapunov;
 mod prediction;
+mod state_report;
 mod statistics;
 mod terms;
 mod thresholds;
@@ -61,7 +62,8 @@ pub(crate) use trajectories::{Portrait, StartBox, TrajectoryRun, TrajectorySumma
 pub use {
     determination::{Determination, Estimate, Observed, constants, determination, misfit},
     prediction::{Predictions, Window, predict_by_constant_velocity, predict_by_motion, prediction_error},
+    state_report::{StateReport, StateReporter},
     terms::{acceleration_errors, mass_matrix_error_within},
     thresholds::MOST_MISFIT,
-    tube::{Tube, TubeError},
+    tube::{MotionTube, Tube, TubeError},
 };

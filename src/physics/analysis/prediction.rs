@@ -7,9 +7,9 @@
 use super::statistics::quantile;
 use super::thresholds::{LEAST_STEPS, STEPS_PER_SAMPLE, TIME_ROUNDING};
 use super::{ValidTime, angle_difference, relative_error, valid_time};
-use crate::data::StateEstimate;
+use crate::data::{Split, StateEstimate};
 use crate::lagrangian::EulerLagrange;
-use crate::recording::hermite;
+use crate::recording::{Smoothed, hermite};
 use crate::rollout::{Force, RolloutError, RolloutOptions, SampledForce, Start, rollout_each};
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,16 @@ impl Window {
     /// `(samples, n)`, at its first sample; a shorter remainder is left out.
     pub fn cut(states: StateEstimate<'_>, interior: std::ops::Range<usize>, n: usize, seconds: f64) -> Vec<Self> {
         Self::unseen(states, &[], (interior, n), seconds)
+    }
+
+    /// The first window of `seconds` of every motion that lasts so long, from its first accurate state.
+    pub fn beginnings(part: &Split, seconds: f64) -> Vec<Self> {
+        let (n, estimated) = (part.recording.n(), part.estimated());
+        let first = |(estimate, states): (&StateEstimate<'_>, &Smoothed)| {
+            let samples = states.interior().start..states.times.len();
+            Self::cut(*estimate, samples, n, seconds).into_iter().next()
+        };
+        estimated.iter().zip(&part.states).filter_map(first).collect()
     }
 
     /// As [`Window::cut`], but each window begins at the last sample that the estimate of its state has used, `reach` after the state.

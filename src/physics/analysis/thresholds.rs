@@ -157,3 +157,10 @@ pub(super) const POINTS_AT_ONCE: usize = 64;
 pub(super) const MOST_AXIS_POINTS: usize = 10_000;
 /// Relative difference of `L` and the energy up to which `L` is a quadratic form of the velocity.
 pub(super) const METRIC_ROUNDING: f64 = 1e-9;
+
+// ---- Reports of states ----
+
+/// Roundings up to which `L` and the energy of a state are equal, as those of a quadratic form of the velocity are.
+pub(super) const METRIC_ROUNDINGS: f64 = 1024.0;
+/// Largest number of parameters whose derivatives are reported: those of systems, not the weights of networks.
+pub(super) const MOST_SHOWN_PARAMETERS: usize = 256;

@@ -9,6 +9,9 @@
 use super::prediction::{Predictions, Window};
 use super::statistics::quantile;
 use super::thresholds::{TIME_ROUNDING, TUBE_KNOTS};
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
 
 /// Why there is no tube.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -159,6 +162,53 @@ fn largest_errors(motions: &[(&Window, &Vec<f64>)], n: usize, step: f64, times: 
         largest
     };
     motions.iter().map(of).collect()
+}
+
+/// A tube around a motion of named coordinates.
+#[derive(Clone, Debug)]
+pub struct MotionTube {
+    tube: Tube,
+    start: f64,
+    coordinates: Vec<String>,
+}
+
+impl MotionTube {
+    /// The tube around a motion that starts at a time.
+    pub fn new(tube: Tube, start: f64, coordinates: Vec<String>) -> Self {
+        Self { tube, start, coordinates }
+    }
+
+    /// Lower and upper limits at a sample.
+    pub fn ends<'a>(&self, t: f64, q: &'a [f64]) -> impl Iterator<Item = [f64; 2]> + use<'a> {
+        let half = self.tube.half_widths(t - self.start);
+        q.iter().zip(half).map(|(q, h)| [q - h, q + h])
+    }
+
+    /// Names of the columns, low and high for every coordinate.
+    pub fn names(&self) -> impl Iterator<Item = String> {
+        self.coordinates.iter().flat_map(|name| ["low", "high"].map(|end| format!("{name}_{end}")))
+    }
+
+    /// Describes the tube in words.
+    pub fn text(&self) -> String {
+        let [scaling, scored] = self.tube.motions;
+        format!("tube for {} of whole motions, from {} motions", self.tube.share, scaling + scored)
+    }
+}
+
+/// Share, motions for shape and for width, times ahead in s, and half of the width at these times by coordinate.
+impl Serialize for MotionTube {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let (tube, n) = (&self.tube, self.coordinates.len());
+        let widths = |i: usize| tube.half_widths.iter().skip(i).step_by(n).copied().collect::<Vec<f64>>();
+        let half_widths = self.coordinates.iter().enumerate().map(|(i, name)| (name.as_str(), widths(i)));
+        let mut facts = serializer.serialize_struct("MotionTube", 4)?;
+        facts.serialize_field("share", &tube.share)?;
+        facts.serialize_field("motions", &tube.motions)?;
+        facts.serialize_field("times", &tube.times)?;
+        facts.serialize_field("half_widths", &half_widths.collect::<BTreeMap<&str, Vec<f64>>>())?;
+        facts.end()
+    }
 }
 
 #[cfg(test)]

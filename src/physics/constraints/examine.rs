@@ -1,7 +1,6 @@
 //! The constraints of a Lagrangian and its degenerate directions.
 
 use super::ConstraintKind;
-use super::thresholds::ZERO_ROUNDINGS;
 use crate::lagrangian::{EulerLagrange, ReducedMass, Request, Terms, project};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -78,7 +77,7 @@ pub fn examine(
         }
         let Ok(reduced) = ReducedMass::of(n, &terms.mass_matrix, &terms.constraint_matrix) else { continue };
         examined.states += 1;
-        let open = reduced.null_directions(ZERO_ROUNDINGS);
+        let open = reduced.null_directions();
         examined.open_states += usize::from(!open.is_empty());
         if open.len() > examined.open {
             examined.open = open.len();

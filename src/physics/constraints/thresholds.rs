@@ -50,8 +50,6 @@ pub(super) const VISIBLE_GRADIENT: f64 = 1e-2;
 /// Ratio of the smallest singular value of the gradients to its largest along the motion below which a second branch counts as reached: half of
 /// the value for a motion that crosses a branch with samples a hundredth of a radian apart.
 pub(super) const BRANCH_RATIO: f64 = 0.005;
-/// Eigenvalues of a mass matrix within its constraints that are below this many roundings of the largest count as zero.
-pub(super) const ZERO_ROUNDINGS: f64 = 1024.0;
 
 // # Verdicts on correlated noise
 

@@ -30,8 +30,10 @@
 //! ```
 
 mod orbits;
-#[cfg(feature = "serde")]
+#[cfg(feature = "data")]
 mod point_report;
+#[cfg(feature = "data")]
+mod surface_report;
 mod surfaces;
 mod tensors;
 
@@ -40,11 +42,14 @@ pub use surfaces::{Change, Character, Surface};
 pub use tensors::{Connection, Curvature, Metric};
 
 // For the packages of this repository.
-#[cfg(feature = "serde")]
-#[doc(hidden)]
-pub use point_report::{PointReport, Value, depends_on_velocity, point_reports};
 #[doc(hidden)]
 pub use surfaces::{characters, grid};
+#[cfg(feature = "data")]
+#[doc(hidden)]
+pub use {
+    point_report::{PointReport, depends_on_velocity},
+    surface_report::SurfaceReport,
+};
 
 use crate::lagrangian::{EulerLagrange, MechanicsError, MetricJet};
 use crate::scalar::Scalar;

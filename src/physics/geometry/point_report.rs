@@ -1,13 +1,12 @@
 //! The geometry at a point by the names of the coordinates: a table for people, LaTeX for papers, and every number for files.
 
 use super::{Geometry, GeometryError};
+use crate::digits::{Value, object, quoted};
 use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::linalg::{Inertia, inertia};
-use crate::names::{latex_name, latex_number, rounded};
+use crate::linalg::inertia;
+use crate::names::{latex_name, latex_number, rounded, trimmed};
 use crate::scalar::{Real, Scalar};
-use alloc::string::{String, ToString};
-use alloc::vec::Vec;
 
 /// Significant digits for people.
 const DIGITS: usize = 7;
@@ -17,9 +16,11 @@ const ROUNDINGS: f64 = 64.0;
 /// Report on the geometry at a point.
 pub struct PointReport<'a, S> {
     /// Names of the coordinates.
-    pub names: &'a [String],
+    names: &'a [String],
+    /// The coordinates in words: `t = 0, r = 4`.
+    pub place: String,
     /// Quantities in the order in which they are reported.
-    pub quantities: Vec<Quantity<S>>,
+    quantities: Vec<Quantity<S>>,
     /// Lengths of the coordinate directions, `sqrt(max_j |g_ij|)`, `(n)`: components are compared after division by them.
     lengths: Vec<f64>,
     /// Reason why the geometry is undefined, if it is.
@@ -27,9 +28,9 @@ pub struct PointReport<'a, S> {
 }
 
 /// A tensor or a number at a point.
-pub struct Quantity<S> {
+struct Quantity<S> {
     /// Name in files; empty if it is for people alone.
-    pub key: &'static str,
+    key: &'static str,
     /// Name for people, with the indices; empty if it is for files alone.
     title: &'static str,
     /// Symbol in LaTeX, of a number or of a tensor without indices.
@@ -39,19 +40,7 @@ pub struct Quantity<S> {
     /// Indices of the components that the others follow from.
     independent: fn(&[usize]) -> bool,
     /// The value.
-    pub value: Value<S>,
-}
-
-/// The value of a quantity.
-pub enum Value<S> {
-    /// The point does not have it.
-    Missing,
-    /// A number.
-    Number(S),
-    /// Numbers of negative and positive eigenvalues.
-    Signature(Inertia),
-    /// Components of a tensor, `(n, .., n)`, and its rank.
-    Tensor(Vec<S>, usize),
+    value: Value<S>,
 }
 
 /// Every component is independent.
@@ -87,22 +76,22 @@ pub fn depends_on_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: 
     first.iter().zip(second).any(|(&a, &b)| (a - b).abs().to_f64() > tolerance)
 }
 
-/// The reports of points, `(points, n)`, as [`Geometry::of`] finds them; a point without geometry has at most its metric.
-///
-/// # Errors
-/// Those of [`Geometry::of`].
-pub fn point_reports<'a, S: Scalar>(
-    model: &dyn EulerLagrange<S>,
-    names: &'a [String],
-    points: &[S],
-    velocity: &[S],
-) -> Result<Vec<PointReport<'a, S>>, GeometryError> {
-    let found = Geometry::of(model, points, velocity)?;
-    let points = points.chunks_exact(names.len());
-    Ok(found.into_iter().zip(points).map(|(found, q)| PointReport::new(names, found, model, q, velocity)).collect())
-}
-
 impl<'a, S: Scalar> PointReport<'a, S> {
+    /// The reports of points, `(points, n)`, as [`Geometry::of`] finds them; a point without geometry has at most its metric.
+    ///
+    /// # Errors
+    /// Those of [`Geometry::of`].
+    pub fn of(
+        model: &dyn EulerLagrange<S>,
+        names: &'a [String],
+        points: &[S],
+        velocity: &[S],
+    ) -> Result<Vec<Self>, GeometryError> {
+        let found = Geometry::of(model, points, velocity)?;
+        let points = points.chunks_exact(names.len());
+        Ok(found.into_iter().zip(points).map(|(found, q)| Self::new(names, found, model, q, velocity)).collect())
+    }
+
     fn new(
         names: &'a [String],
         found: Result<Geometry<S>, GeometryError>,
@@ -126,7 +115,9 @@ impl<'a, S: Scalar> PointReport<'a, S> {
             _ => 1.0,
         };
         let lengths = metric.chunks_exact(names.len()).map(length).collect();
-        Self { names, quantities: quantities(&metric, found.as_ref()), lengths, problem }
+        let parts = names.iter().zip(q).map(|(name, x)| format!("{name} = {}", trimmed(x.to_f64(), DIGITS)));
+        let place = parts.collect::<Vec<_>>().join(", ");
+        Self { names, place, quantities: quantities(&metric, found.as_ref()), lengths, problem }
     }
 
     /// Components beyond rounding that the others follow from, with their indices.
@@ -195,6 +186,13 @@ impl<'a, S: Scalar> PointReport<'a, S> {
             findings.line(problem);
         }
         findings
+    }
+
+    /// Every component with all digits, as an object on one line of JSON.
+    pub fn json(&self) -> String {
+        let quantities = self.quantities.iter().filter(|quantity| !quantity.key.is_empty());
+        let fields = quantities.map(|quantity| (quantity.key, quantity.value.json(self.names.len())));
+        object(fields.chain(self.problem.as_deref().map(|problem| ("error", quoted(problem)))))
     }
 
     /// The report as an `align*` environment, with the heading as a comment.
@@ -296,7 +294,7 @@ mod tests {
     fn report(name: &str, names: [&str; 4], q: [f64; 4]) -> [String; 2] {
         let (model, names) =
             (SystemInstance::<f64>::named(name, &[]).unwrap().build().unwrap(), names.map(String::from));
-        let report = point_reports(&*model, &names, &q, &[0.0; 4]).unwrap().remove(0);
+        let report = PointReport::of(&*model, &names, &q, &[0.0; 4]).unwrap().remove(0);
         [report.findings("here").to_string(), report.latex("here")]
     }
 

@@ -62,6 +62,7 @@ pub use {
     conserved::quadratic_unknowns,
     field::drifts,
     null_space::{bases, enough, most_symmetries},
+    report::ChargeDrift,
     sample::middle,
     thresholds::{MOST_FIELDS, MOST_UNKNOWNS, TOLERANCES},
 };
@@ -137,7 +138,7 @@ pub enum SymmetryError {
         found: usize,
     },
     /// A base state at which a Lagrangian has no canonical form.
-    #[error("no canonical form at this state: {0}")]
+    #[error("no canonical form at this state: {}", .0.problem(&[]))]
     Base(MechanicsError),
     /// Numbers of a decomposition that are not finite.
     #[error("{what} is not finite")]

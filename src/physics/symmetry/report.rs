@@ -1,7 +1,7 @@
 //! Reports of symmetries and of comparisons.
 
 use super::thresholds::{MOST_SHOWN, OTHER_LAGRANGIAN, SAME_MOTION, SHOWN_BEYOND_GAP, UNIT_FACTOR};
-use super::{Comparison, Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
+use super::{Charge, Comparison, Degrees, Invariant, MOST_FIELDS, Quadratic, Symmetries};
 use crate::findings::Findings;
 use crate::names::{number as digits, pluralize, rounded};
 use serde::{Serialize, Serializer};
@@ -51,6 +51,58 @@ pub struct SymmetrySummary {
     /// Quantities of second degree in the momenta, if they were sought.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadratic: Option<QuadraticSummary>,
+}
+
+/// A charge along a motion, and the parts of its drift.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChargeDrift {
+    /// `energy`, or `g(v, v)/2` along geodesics of a metric with a time, or the field whose charge it is.
+    pub symmetry: String,
+    /// Charge at the start.
+    pub start: f64,
+    /// Charge at the end.
+    pub end: f64,
+    /// Charge at the end less that at the start, the sum of the next two.
+    pub drift: f64,
+    /// Drift because the model breaks the symmetry.
+    pub by_model: f64,
+    /// Remaining drift, caused by the integrator.
+    pub by_integrator: f64,
+    /// Largest distance from the charge at the start.
+    pub largest: f64,
+}
+
+impl ChargeDrift {
+    /// Headers of a table of charges.
+    pub const HEADERS: [&'static str; 6] =
+        ["charge of", "start", "drift", "by the model", "by the integrator", "largest"];
+
+    /// Its row of the table.
+    pub fn row(&self) -> Vec<String> {
+        let numbers = [self.drift, self.by_model, self.by_integrator, self.largest].map(|x| rounded(x, 3));
+        [vec![self.symmetry.clone(), rounded(self.start, 10)], numbers.to_vec()].concat()
+    }
+}
+
+impl Symmetries {
+    /// The drifts of the energy and of the charges of all fields along a motion: `charges` are those of [`Charge::of`].
+    pub fn drifts(&self, charges: &[Charge]) -> Vec<ChargeDrift> {
+        let fields = self.fields.iter().map(|field| field.text(&self.basis));
+        let names = std::iter::once(self.invariant.charge().to_string()).chain(fields);
+        let drift = |(symmetry, charge): (String, &Charge)| {
+            let [start, end] = [charge.values.first(), charge.values.last()].map(|x| x.copied().unwrap_or(f64::NAN));
+            ChargeDrift {
+                symmetry,
+                start,
+                end,
+                drift: charge.drift,
+                by_model: charge.by_model,
+                by_integrator: charge.by_integrator,
+                largest: charge.values.iter().fold(0.0, |most, x| most.max((x - start).abs())),
+            }
+        };
+        names.zip(charges).map(drift).collect()
+    }
 }
 
 fn as_text<S: Serializer>(basis: &Degrees, serializer: S) -> Result<S::Ok, S::Error> {

@@ -223,7 +223,7 @@ fn states_are_placed_by_row_and_column() {
     );
     refused(b"1,2,3,4\n", &["row 1: expected a header with the columns theta1,theta2"]);
     refused(b"\xef\xbb\xbf\r\n\r\n", &["the file is empty, expected a header with the columns theta1,theta2"]);
-    refused(&[HEADER.as_bytes(), b"\r\n \r\n"].concat(), &["no states below the header"]);
+    refused(&[HEADER.as_bytes(), b"\r\n \r\n"].concat(), &["no rows below the header"]);
     // Any number of digits is one number, and quickly.
     let long = "1".repeat(300) + "." + &"7".repeat(1_000_000) + "e-300";
     for precision in ["f32", "f64", "dd"] {

@@ -11,7 +11,17 @@ const FLOORS: [(&str, &[&str]); 6] = [
     ("learning", &["recording", "state", "optimizers", "configuration", "data", "training", "shooting", "presets"]),
     (
         "physics",
-        &["geometry", "constraints", "symmetry", "certificate", "analysis", "relativity", "identification", "formula"],
+        &[
+            "digits",
+            "geometry",
+            "constraints",
+            "symmetry",
+            "certificate",
+            "analysis",
+            "relativity",
+            "identification",
+            "formula",
+        ],
     ),
     ("app", &["experiments", "report", "pipeline"]),
 ];

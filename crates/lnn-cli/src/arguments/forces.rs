@@ -3,14 +3,13 @@
 use crate::CliError;
 use crate::arguments::number::{choice, finite, index_of};
 use crate::arguments::recording_args::unit;
-use crate::arguments::states::{column_names, parse_table};
 use crate::terminal::output;
 use crate::thresholds::{MAX_STATES_BYTES, ROUNDING_OF_TIMES};
 use lnn::lagrangian::NamedFormula;
 use lnn::names::unknown;
 use lnn::network::file::Header;
 use lnn::pipeline::usual_force;
-use lnn::recording::{TIME, factor};
+use lnn::recording::{NumberTable, TIME, factor};
 use lnn::rollout::{Between, Force, SampledForce};
 use lnn::storage::read_regular;
 use std::fmt;
@@ -179,7 +178,7 @@ impl ForceArgs {
     ) -> Result<SampledForce<f64>, CliError> {
         let refused = |problem: &dyn fmt::Display| CliError::file(path, problem);
         let bytes = read_regular(path, MAX_STATES_BYTES).map_err(|e| refused(&e))?;
-        let header = column_names(&bytes).map_err(|e| refused(&e))?;
+        let header = NumberTable::<f64>::names(&bytes).map_err(|e| refused(&e))?;
         let mut columns = vec![self.time_column(&header).map_err(|problem| refused(&problem))?];
         let places = components.places(&header, &mut columns);
         if let Some(i) = (0..places.len()).find(|&i| places[i].is_some() && constants[i].is_some()) {
@@ -193,7 +192,7 @@ impl ForceArgs {
             return Err(refused(&format_args!("no column of forces, expected {}", components.known.join(", "))));
         }
         let factors = self.factors(&columns)?;
-        let table = parse_table::<f64>(&bytes, &columns).map_err(|e| refused(&e))?;
+        let table = NumberTable::<f64>::read(&bytes, &columns).map_err(|e| refused(&e))?;
         let (mut times, mut values) = (Vec::with_capacity(table.rows.len()), Vec::new());
         for (row, &line) in table.values.chunks_exact(columns.len()).zip(&table.rows) {
             let t = row[0] * factors[0];

@@ -15,6 +15,11 @@ pub fn name(path: &Path) -> String {
     if is_standard(path) { "standard input".to_string() } else { path.display().to_string() }
 }
 
+/// Name of an output in messages.
+pub fn place(out: &Path) -> String {
+    if is_standard(out) { "standard output".to_string() } else { out.display().to_string() }
+}
+
 /// Reads a regular file, or standard input to its end, of at most `limit` bytes.
 ///
 /// # Errors

@@ -4,8 +4,11 @@ use crate::CliError;
 use crate::arguments::forces;
 use crate::arguments::forces::KnownForce;
 use crate::arguments::learned::{Learned, model_file};
-use crate::arguments::source::Source;
+use crate::arguments::number::finite;
+use crate::arguments::probe::Probe;
+use crate::arguments::source::{Source, parameter};
 use crate::arguments::system_arg::{self, learned_system};
+use crate::commands::constraints::constrained;
 use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::report::with_unit;
 use lnn::rollout::{Domain, Event};
@@ -111,11 +114,6 @@ impl MotionSource {
         known
     }
 
-    /// Name of the parameter of the motion: `t`, or `tau` if a coordinate is called `t`.
-    pub fn parameter_name(&self) -> &'static str {
-        if self.columns.iter().any(|name| name == "t") { "tau" } else { "t" }
-    }
-
     /// Label of the parameter of the motion: a time, or the affine parameter of geodesics, which is the proper time of matter.
     pub fn parameter(&self) -> String {
         let parameter = if self.time_like { "affine parameter" } else { "time" };
@@ -125,5 +123,62 @@ impl MotionSource {
     /// The states that the motion should stay within: the training states of a model, all states for a system.
     pub fn range(&self) -> Domain<f64> {
         self.domain.clone().unwrap_or_else(|| Domain::new(vec![None; self.columns.len()]))
+    }
+}
+
+/// A model or a system with an initial state, and what holds its motion.
+#[derive(Debug, clap::Args)]
+pub struct MotionArgs {
+    /// Model, a file or the directory of a run.
+    #[arg(required_unless_present = "system")]
+    pub model: Option<PathBuf>,
+    /// Predict the exact motion of a system instead of a model, by name (`lnn systems` lists them) or by its file.
+    #[arg(long, value_name = "NAME|FILE", conflicts_with = "model")]
+    system: Option<String>,
+    /// A parameter of the system; may be repeated.
+    #[arg(long, value_name = "SYMBOL=VALUE", conflicts_with = "model", value_parser = parameter)]
+    param: Vec<(String, String)>,
+    /// Initial state: coordinates, then velocities, separated by commas. It is used as given, on a mass shell or off it. Under
+    /// constraints, a state that misses them by less than a thousandth of its size is projected onto them, and any other is refused.
+    #[arg(long, value_name = "q1,..,v1,..", required = true, value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    pub state: Vec<f64>,
+    /// Constraints that hold the motion, a file with a table [constraints] as `lnn constraints --out` writes it.
+    #[arg(long, value_name = "FILE.toml")]
+    pub constraints: Option<PathBuf>,
+    /// Take the acceleration of least norm where the mass matrix is singular, and report the number of free directions.
+    #[arg(long)]
+    pub least_norm: bool,
+}
+
+impl MotionArgs {
+    /// The source of the motion, under the given constraints.
+    ///
+    /// # Errors
+    /// Those of [`MotionSource::model`] and [`MotionSource::system`], and a usage error for a state of the wrong length.
+    pub fn read(&self) -> Result<MotionSource, CliError> {
+        let mut source = match &self.model {
+            Some(path) => MotionSource::model(path)?,
+            None => MotionSource::system(self.system.as_deref().unwrap_or_default(), &self.param)?,
+        };
+        let (expected, found) = (source.columns.len(), self.state.len());
+        if found != expected {
+            let names = source.columns.join(",");
+            return Err(CliError::usage(format_args!("--state: expected {expected} numbers ({names}), found {found}")));
+        }
+        if let Some(file) = &self.constraints {
+            source.model = constrained(source.model, &source.columns, file, self.state.split_at(expected / 2))?;
+        }
+        Ok(source)
+    }
+
+    /// The same model or system as a subject of analysis.
+    ///
+    /// # Errors
+    /// Those of [`Probe::model`] and [`Probe::system`].
+    pub fn probe(&self) -> Result<Probe, CliError> {
+        match &self.model {
+            Some(path) => Probe::model(path),
+            None => Probe::system(self.system.as_deref().unwrap_or_default(), &self.param),
+        }
     }
 }

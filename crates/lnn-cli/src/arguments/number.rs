@@ -178,6 +178,18 @@ pub fn index_of(option: &str, what: &str, name: &str, known: &[String]) -> Resul
     })
 }
 
+/// Finds the indices of different names in a list, as [`index_of`] does.
+///
+/// # Errors
+/// A usage error for an unknown name, or for one that is given twice.
+pub fn indices_of(option: &str, what: &str, names: &[String], known: &[String]) -> Result<Vec<usize>, CliError> {
+    let index = |(k, name): (usize, &String)| match names[..k].contains(name) {
+        true => Err(CliError::usage(format_args!("{option}: {what} {name} is given twice"))),
+        false => index_of(option, what, name, known),
+    };
+    names.iter().enumerate().map(index).collect()
+}
+
 /// A number of threads.
 pub fn thread_count(text: &str) -> Result<usize, String> {
     whole(1, MOST_THREADS)(text)

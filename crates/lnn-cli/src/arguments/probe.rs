@@ -5,11 +5,13 @@ use crate::arguments::learned::{Learned, held};
 use crate::arguments::number::{bounds, index_of, positive};
 use crate::arguments::source::{Source, require_at_most};
 use crate::arguments::system_arg::{self, learned_system};
-use crate::thresholds::NARROWEST_RANGE;
+use crate::thresholds::{CHARGES_SEED, NARROWEST_RANGE};
 use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::network::file::MAX_COORDINATES;
+use lnn::rollout::Trajectory;
 use lnn::symmetry::{
-    Basis, Chart, Degrees, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states, most_symmetries,
+    Basis, Charge, ChargeDrift, Chart, Degrees, Region, Symmetries, TOLERANCES, bases, enough, middle, most_states,
+    most_symmetries, unknowns,
 };
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -261,6 +263,18 @@ impl Probe {
     ) -> Result<(Symmetries, Degrees), CliError> {
         let bases = bases(self.coordinates(), &self.charts(), degrees, self.exact);
         most_symmetries(self.model.as_ref(), bases, states, (tolerance, self.exact)).map_err(CliError::data)
+    }
+
+    /// The charges of the point symmetries in the default basis along a motion.
+    ///
+    /// # Errors
+    /// A usage error for a region outside the domain, a data error for terms that are not finite.
+    pub fn charges(&self, motion: &Trajectory<f64>) -> Result<Vec<ChargeDrift>, CliError> {
+        let (largest, model) = (self.basis(None)?.0, self.model.as_ref());
+        let (q, v) = self.states(self.enough(unknowns(model.coordinates(), largest.len())), CHARGES_SEED)?;
+        let (found, _) = self.symmetries(None, (&q, &v), None)?;
+        let charges = Charge::of(model, &found.basis, &found.fields, motion).map_err(CliError::data)?;
+        Ok(found.drifts(&charges))
     }
 
     /// Number of states to examine for a number of unknown coefficients.

@@ -15,6 +15,7 @@ use lnn::lagrangian::{Description, DescriptionError, SystemError, SystemInstance
 use lnn::network::Initialization;
 use lnn::pipeline::{StartModel as Start, all_parameters};
 use lnn::presets::Preset;
+use lnn::report::SystemEntry;
 use serde::Deserialize;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -167,11 +168,11 @@ impl Args {
         if format == PrintFormat::Markdown {
             return output::print(&training_reference());
         }
-        let described = crate::commands::systems::parameters(&system.system);
+        let described = SystemEntry::of(&system.system).parameters;
         let remark = |name: &str| {
-            let [_, default, unit, range] = described.iter().find(|[symbol, ..]| symbol == name)?;
-            let unit = if unit == "1" { String::new() } else { format!(", in {unit}") };
-            Some(format!("{range}{unit}; {default} unless set"))
+            let known = described.iter().find(|parameter| parameter.symbol == name)?;
+            let unit = if known.unit == "1" { String::new() } else { format!(", in {}", known.unit) };
+            Some(format!("{}{unit}; {} unless set", known.range, known.default))
         };
         let table = toml::Table::try_from(&config).map_err(CliError::data)?;
         output::print(&commented(Config::KEYS, &table, &remark))

@@ -2,21 +2,16 @@
 
 use crate::CliError;
 use crate::arguments::input;
-use crate::arguments::number::{Precision, list, named, whole};
+use crate::arguments::number::{Precision, indices_of, list, named, whole};
 use crate::arguments::source::{Source, SystemOrModel, require_at_most};
-use crate::arguments::states::{Table, parse_table};
-use crate::terminal::format::report_failures;
+use crate::terminal::format::print_rows;
 use crate::terminal::output;
 use crate::thresholds::{MAX_STATES_BYTES, MOST_METRIC_COORDINATES, MOST_PIECES, ROWS_AT_ONCE};
-use lnn::geometry::{GeometryError, MOST_COORDINATES, PointReport, at_once, depends_on_velocity, point_reports};
+use lnn::geometry::{GeometryError, MOST_COORDINATES, PointReport, SurfaceReport, at_once, depends_on_velocity};
 use lnn::lagrangian::EulerLagrange;
-use lnn::names::trimmed;
+use lnn::recording::NumberTable;
 use lnn::scalar::{Dd, Real, Scalar};
 use std::path::{Path, PathBuf};
-use surfaces::Line;
-
-mod surfaces;
-mod tensors;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -86,79 +81,88 @@ fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let source = args.subject.read(Source::<S>::model, Source::<S>::system)?;
     let n = source.columns.len() / 2;
     require_at_most(MOST_METRIC_COORDINATES, n)?;
-    let names = &source.columns[..n];
     let velocity = match &args.velocity {
-        Some(text) => list("--velocity", text, names)?,
+        Some(text) => list("--velocity", text, &source.columns[..n])?,
         None => vec![<S as Real>::zero(); n],
     };
     let usual = if args.points.is_some() { Format::Json } else { Format::Table };
     let format = if args.json { Format::Json } else { args.format.unwrap_or(usual) };
+    let metric = Metric { model: source.model.as_ref(), names: &source.columns[..n], velocity, format };
     if let (Some(from), Some(to)) = (&args.from, &args.to) {
-        if format == Format::Latex {
-            return Err(CliError::usage("--format latex: expected json or table with --surface"));
-        }
-        let ends: [Vec<S>; 2] = [list("--from", from, names)?, list("--to", to, names)?];
-        note_velocity(&*source.model, &ends[0], &velocity);
-        let line = Line { block: &args.surface, ends: (&ends[0], &ends[1]), velocity: &velocity, steps: args.steps };
-        return line.print(&source, format == Format::Table);
+        return metric.print_surfaces(&args.surface, (from, to), args.steps);
     }
     if n > MOST_COORDINATES {
         return Err(CliError::usage(GeometryError::TooMany { found: n, most: MOST_COORDINATES }));
     }
-    if let Some(text) = &args.at {
-        let point = named("--at", text, names)?;
-        note_velocity(&*source.model, &point, &velocity);
-        let report = point_reports(&*source.model, names, &point, &velocity).map_err(CliError::data)?.remove(0);
-        output::print(&written(format, &report, &heading(names, &point)))?;
-        return report.problem.map_or(Ok(()), |problem| Err(CliError::data(format_args!("--at: {problem}"))));
+    match (&args.at, &args.points) {
+        (Some(text), _) => metric.print_point(text),
+        (_, Some(file)) => metric.print_points(file),
+        _ => Err(CliError::usage("--points: expected a file")),
     }
-    let Some(points) = &args.points else { return Err(CliError::usage("--points: expected a file")) };
-    print_points(points, &*source.model, (names, &velocity), format)
 }
 
-/// Prints the geometry of the points of a file.
-fn print_points<S: Scalar>(
-    file: &Path,
-    model: &dyn EulerLagrange<S>,
-    (names, velocity): (&[String], &[S]),
+/// A metric at a velocity, and the form of what is printed.
+struct Metric<'a, S> {
+    model: &'a dyn EulerLagrange<S>,
+    names: &'a [String],
+    velocity: Vec<S>,
     format: Format,
-) -> Result<(), CliError> {
-    let n = names.len();
-    let bytes = input::read(file, MAX_STATES_BYTES)?;
-    let Table { values, rows } = parse_table::<S>(&bytes, names).map_err(|e| CliError::input(file, e))?;
-    drop(bytes);
-    note_velocity(model, &values[..n], velocity);
-    let chunk = at_once(n).min(ROWS_AT_ONCE);
-    let mut failures: Vec<(usize, String)> = Vec::new();
-    for (points, rows) in values.chunks(chunk * n).zip(rows.chunks(chunk)) {
-        let reports = point_reports(model, names, points, velocity).map_err(CliError::data)?;
-        let mut text = String::new();
-        for ((report, q), &row) in reports.into_iter().zip(points.chunks(n)).zip(rows) {
-            text += &written(format, &report, &format!("row {row}: {}", heading(names, q)));
-            failures.extend(report.problem.map(|problem| (row, problem)));
+}
+
+impl<S: Scalar> Metric<'_, S> {
+    /// Prints the surfaces on a line.
+    fn print_surfaces(&self, block: &[String], (from, to): (&str, &str), steps: usize) -> Result<(), CliError> {
+        if self.format == Format::Latex {
+            return Err(CliError::usage("--format latex: expected json or table with --surface"));
         }
-        output::print(&text)?;
+        let ends: [Vec<S>; 2] = [list("--from", from, self.names)?, list("--to", to, self.names)?];
+        self.note_velocity(&ends[0]);
+        let block = indices_of("--surface", "coordinate", block, self.names)?;
+        let (about, ends) = ((self.model, self.names), (&ends[0][..], &ends[1][..]));
+        let found = SurfaceReport::of(about, block, ends, &self.velocity, steps).map_err(CliError::data)?;
+        output::print(&if self.format == Format::Table { found.findings().to_string() } else { found.json() })
     }
-    report_failures(file, &failures)
-}
 
-/// Describes a point in words.
-fn heading<S: Scalar>(names: &[String], q: &[S]) -> String {
-    let parts = names.iter().zip(q).map(|(name, x)| format!("{name} = {}", trimmed(x.to_f64(), 7)));
-    parts.collect::<Vec<_>>().join(", ")
-}
+    /// Prints the geometry of one point.
+    fn print_point(&self, text: &str) -> Result<(), CliError> {
+        let point = named("--at", text, self.names)?;
+        self.note_velocity(&point);
+        let report = PointReport::of(self.model, self.names, &point, &self.velocity).map_err(CliError::data)?.remove(0);
+        output::print(&self.format.written(&report, &report.place))?;
+        report.problem.map_or(Ok(()), |problem| Err(CliError::data(format_args!("--at: {problem}"))))
+    }
 
-fn written<S: Scalar>(format: Format, report: &PointReport<S>, heading: &str) -> String {
-    match format {
-        Format::Json => tensors::object(report),
-        Format::Table => report.findings(heading).to_string(),
-        Format::Latex => report.latex(heading),
+    /// Prints the geometry of the points of a file.
+    fn print_points(&self, file: &Path) -> Result<(), CliError> {
+        let n = self.names.len();
+        let bytes = input::read(file, MAX_STATES_BYTES)?;
+        let table = NumberTable::<S>::read(&bytes, self.names).map_err(|e| CliError::input(file, e))?;
+        drop(bytes);
+        self.note_velocity(&table.values[..n]);
+        print_rows(file, &table.rows, at_once(n).min(ROWS_AT_ONCE), |places| {
+            let points = table.part(places.clone(), 0..n);
+            let reports = PointReport::of(self.model, self.names, &points, &self.velocity).map_err(CliError::data)?;
+            let text = |(report, row): (PointReport<'_, S>, &usize)| {
+                (self.format.written(&report, &format!("row {row}: {}", report.place)), report.problem)
+            };
+            Ok(reports.into_iter().zip(&table.rows[places]).map(text).collect())
+        })
+    }
+
+    /// Prints a note if the metric depends on the velocity.
+    fn note_velocity(&self, q: &[S]) {
+        if depends_on_velocity(self.model, q, &self.velocity) {
+            output::note("the mass matrix depends on the velocity; it is taken at --velocity, by default at rest");
+        }
     }
 }
 
-/// Prints a note if the metric depends on the velocity.
-fn note_velocity<S: Scalar>(model: &dyn EulerLagrange<S>, q: &[S], v: &[S]) {
-    if depends_on_velocity(model, q, v) {
-        output::note("the mass matrix depends on the velocity; it is taken at --velocity, by default at rest");
+impl Format {
+    fn written<S: Scalar>(self, report: &PointReport<'_, S>, heading: &str) -> String {
+        match self {
+            Self::Json => report.json(),
+            Self::Table => report.findings(heading).to_string(),
+            Self::Latex => report.latex(heading),
+        }
     }
 }

@@ -1,7 +1,6 @@
 //! The commands, each from its arguments to what it prints.
 
 pub mod certify;
-pub mod charges;
 pub mod check;
 pub mod compare;
 pub mod constraints;
@@ -13,7 +12,6 @@ pub mod identify;
 pub mod inspect;
 pub mod inverse;
 pub mod manual;
-pub mod motion;
 pub mod page;
 pub mod rollout;
 pub mod shadow;
@@ -21,4 +19,3 @@ pub mod sweep;
 pub mod symmetries;
 pub mod systems;
 pub mod train;
-pub mod tube;

@@ -1,8 +1,8 @@
 //! `lnn page`: writes a model as an interactive page.
 
 use crate::CliError;
+use crate::arguments::input::place;
 use crate::arguments::learned::{Learned, model_file};
-use crate::commands::motion::place;
 use crate::directories::files::OutputFile;
 use lnn::report::page;
 use std::path::PathBuf;

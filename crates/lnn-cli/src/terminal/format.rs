@@ -1,13 +1,14 @@
 //! Prints results for states, one after another, as JSON or text.
 
 use crate::CliError;
-use crate::terminal::{json, output};
+use crate::terminal::output;
 use crate::thresholds::{NUMBERS_AT_ONCE, ROWS_AT_ONCE};
+use lnn::analysis::StateReport;
 use lnn::findings::Findings;
-use lnn::lagrangian::MechanicsError;
 use lnn::names::pluralize;
 use lnn::scalar::Scalar;
 use serde::Serialize;
+use std::ops::Range;
 use std::path::Path;
 
 /// Number of rows in a chunk for `n` coordinates, whose matrices have `n^2` numbers.
@@ -60,7 +61,7 @@ pub enum Format {
 ///
 /// # Errors
 /// A data error if any row failed.
-pub fn report_failures(file: &Path, failures: &[(usize, String)]) -> Result<(), CliError> {
+fn report_failures(file: &Path, failures: &[(usize, String)]) -> Result<(), CliError> {
     let [(row, problem), rest @ ..] = failures else { return Ok(()) };
     let more = match rest.len() {
         0 => String::new(),
@@ -69,58 +70,31 @@ pub fn report_failures(file: &Path, failures: &[(usize, String)]) -> Result<(), 
     Err(CliError::input(file, format_args!("row {row}: {problem}{more}")))
 }
 
-/// Explains an error without the row in the batch, which means nothing to a user.
-pub fn explain(error: MechanicsError) -> String {
-    match error {
-        MechanicsError::Singular { condition, .. } => {
-            format!("the mass matrix is singular (condition number {condition:.3e})")
-        }
-        MechanicsError::NotFinite { what, .. } => format!("{what} is not finite"),
-        MechanicsError::Undriven { .. } => "it can move while the drives stand still".to_string(),
-        other => other.to_string(),
+/// Prints the texts of the rows of a file, a batch of at most `size` after another, and reports the rows that failed.
+///
+/// `batch` takes positions in `rows`, whose entries are lines of the file, and returns for each its text and what is wrong with it.
+///
+/// # Errors
+/// Those of `batch`; a data error if any row failed.
+pub fn print_rows(
+    file: &Path,
+    rows: &[usize],
+    size: usize,
+    mut batch: impl FnMut(Range<usize>) -> Result<Vec<(String, Option<String>)>, CliError>,
+) -> Result<(), CliError> {
+    let mut failures = Vec::new();
+    for start in (0..rows.len()).step_by(size) {
+        let places = start..rows.len().min(start + size);
+        let (texts, problems): (String, Vec<Option<String>>) = batch(places.clone())?.into_iter().unzip();
+        failures.extend(rows[places].iter().zip(problems).filter_map(|(row, problem)| Some((*row, problem?))));
+        output::print(&texts)?;
     }
+    report_failures(file, &failures)
 }
 
-/// A named result: its numbers, and the row length if it is a matrix.
-pub struct Field<'a, S> {
-    pub name: &'static str,
-    pub values: &'a [S],
-    pub shape: Shape,
-}
-
-/// Arrangement of the numbers of a result.
-pub enum Shape {
-    Number,
-    Vector,
-    Matrix,
-}
-
-/// One state as a line of JSON or a block of text; a failed acceleration is `null`.
-pub fn show<S: Scalar>(format: Format, row: usize, fields: &[Field<'_, S>], problem: Option<&str>) -> String {
-    let n = fields.iter().find(|f| matches!(f.shape, Shape::Vector)).map_or(1, |f| f.values.len());
-    let mut parts: Vec<(&str, String)> = fields
-        .iter()
-        .map(|field| {
-            let lost = field.values.is_empty() || (problem.is_some() && field.values.iter().any(|x| !x.is_finite()));
-            let text = match field.shape {
-                _ if lost => "null".to_string(),
-                Shape::Number => field.values.iter().map(|x| json::number(*x)).collect(),
-                Shape::Vector => json::vector(field.values),
-                Shape::Matrix => json::matrix(field.values, n),
-            };
-            (field.name, text)
-        })
-        .collect();
-    parts.extend(problem.map(|text| ("error", json::string(text))));
-    match format {
-        Format::Json => {
-            let parts: Vec<String> = parts.iter().map(|(name, text)| format!("\"{name}\":{text}")).collect();
-            format!("{{{}}}\n", parts.join(","))
-        }
-        Format::Table | Format::Csv => {
-            let width = parts.iter().map(|(name, _)| name.len() + 1).fold(13, usize::max);
-            let lines: String = parts.iter().map(|(name, text)| format!("  {name:<width$}{text}\n")).collect();
-            format!("row {row}\n{lines}")
-        }
+impl Format {
+    /// The text of the state on a row of a file.
+    pub fn state<S: Scalar>(self, row: usize, report: &StateReport<S>) -> String {
+        if self == Self::Json { report.json() } else { report.text(&format!("row {row}")) }
     }
 }

@@ -3,7 +3,6 @@
 pub mod error;
 pub mod format;
 pub mod interrupt;
-pub mod json;
 pub mod output;
 pub mod progress;
 pub mod result_page;

@@ -14,6 +14,7 @@ mod gzip;
 mod npy;
 mod npz;
 mod number;
+mod number_table;
 mod pieces;
 mod select;
 mod shared;
@@ -27,9 +28,9 @@ mod xml;
 pub use encoding::Encoding;
 pub use error::{DataError, Problem};
 pub use facts::{FileFacts, FileKind};
+pub use number_table::{NumberTable, NumberTableError};
 pub use table::RawTable;
 pub use text::Separator;
-pub use text::{comment, line_end, names_in, split};
 use thresholds::LARGEST_FILE;
 pub(crate) use thresholds::LEAST_SAMPLES;
 

@@ -128,6 +128,29 @@ impl MechanicsError {
         }
     }
 
+    /// Says what is wrong at one state, with the constraints by their names, and without its row in a batch.
+    #[cfg(feature = "std")]
+    #[must_use]
+    pub fn problem(&self, constraints: &[String]) -> String {
+        let name = |constraint: usize| constraints.get(constraint).map_or("?", String::as_str);
+        match *self {
+            Self::Singular { condition, .. } => {
+                format!("the mass matrix is singular (condition number {condition:.3e})")
+            }
+            Self::Dependent { constraint, .. } => {
+                format!("the constraint `{}` depends on the others", name(constraint))
+            }
+            Self::OffConstraints { constraint, distance, .. } => format!(
+                "the acceleration is {distance:.3e} away from what the constraints allow, most by `{}`",
+                name(constraint)
+            ),
+            Self::Undriven { .. } => "it can move while the drives stand still".to_string(),
+            Self::NotFinite { what, .. } => format!("{what} is not finite"),
+            Self::Uncertified { .. } => "the mass matrix is not certified".to_string(),
+            _ => self.to_string(),
+        }
+    }
+
     /// Returns the same failure for another row.
     pub(crate) fn at_row(mut self, to: usize) -> Self {
         if let Self::Singular { row, .. }

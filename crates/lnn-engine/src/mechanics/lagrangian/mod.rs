@@ -86,7 +86,7 @@ pub use {
 #[cfg(feature = "serde")]
 #[doc(hidden)]
 pub use {
-    description::{PerTrajectory, pair},
+    description::{PerTrajectory, ShownLink, pair},
     expression::quantity,
 };
 

@@ -28,6 +28,8 @@ pub(super) const RANK_ROUNDINGS: f64 = 16.0;
 pub(super) const REDUNDANT_ROW: f64 = 1e-6;
 /// Defects below this multiple of the rounding error of the state count as zero.
 pub(super) const PROJECTION_ROUNDINGS: f64 = 1024.0;
+/// An eigenvalue of the mass matrix within the constraints below this many roundings of the largest one counts as zero.
+pub(super) const NULL_ROUNDINGS: f64 = 1024.0;
 /// Accelerations are accepted if they violate the constraints by less than this fraction of their size, or of the size of the accelerations
 /// that the forces cause. This allows for values that a person has rounded to three digits.
 pub(super) const NEAR_CONSTRAINTS: f64 = 1e-3;

@@ -51,6 +51,22 @@ impl<S: Scalar> LeastNormMotion<S> {
     }
 }
 
+impl<M> LeastNorm<M> {
+    /// The number of directions within the constraints in which the mass matrix of a state is singular, so that the equations do not
+    /// determine the motion; 0 where the model fails.
+    pub fn open_directions<S: Scalar>(&self, t: S, q: &[S], v: &[S]) -> usize
+    where
+        M: EulerLagrange<S>,
+    {
+        let mut terms = Terms::default();
+        match self.0.terms_at(&[t], q, v, Request::MASS_MATRIX | Request::CONSTRAINTS, &mut terms) {
+            Ok(()) => ReducedMass::of(q.len(), &terms.mass_matrix, &terms.constraint_matrix)
+                .map_or(0, |reduced| reduced.null_directions().len()),
+            Err(_) => 0,
+        }
+    }
+}
+
 impl<M: EulerLagrange<S>, S: Scalar> EulerLagrange<S> for LeastNorm<M> {
     fn coordinates(&self) -> usize {
         self.0.coordinates()

@@ -1,6 +1,7 @@
 //! The mass matrix within the constraints.
 
 use super::rows::{complement, dot, independent_rows};
+use crate::lagrangian::thresholds::NULL_ROUNDINGS;
 use crate::linalg::{LinalgError, Workspace, eigh};
 use crate::scalar::{Real, Scalar};
 use alloc::vec::Vec;
@@ -48,12 +49,12 @@ impl<S: Scalar> ReducedMass<S> {
 
     /// Returns the null directions `z` with `M z = 0` within the constraints, in which the Lagrangian is degenerate.
     ///
-    /// An eigenvalue below `roundings` times the rounding error of the largest one counts as zero.
-    pub fn null_directions(&self, roundings: f64) -> Vec<&[S]> {
+    /// An eigenvalue below 1024 times the rounding error of the largest one counts as zero.
+    pub fn null_directions(&self) -> Vec<&[S]> {
         let d = self.eigenvalues.len();
         let n = self.directions.len() / d.max(1);
         let most = self.eigenvalues.iter().fold(<S as Real>::zero(), |most, w| Real::max(most, w.abs()));
-        let floor = S::of_f64(roundings) * S::epsilon() * most;
+        let floor = S::of_f64(NULL_ROUNDINGS) * S::epsilon() * most;
         let pairs = self.eigenvalues.iter().zip(self.directions.chunks_exact(n.max(1)));
         pairs.filter(|(w, _)| w.abs() <= floor).map(|(_, direction)| direction).collect()
     }

@@ -27,7 +27,7 @@ use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-pub(crate) use chain::ShownLink;
+pub use chain::ShownLink;
 pub use chain::turned;
 use chain::{ChainDescription, LinkDescription};
 pub use chain::{inertia_symbols, loss_symbols};

@@ -137,6 +137,7 @@ pub struct ShownLink<'a> {
     pub prismatic: bool,
     /// The coordinate that moves it, and its motion per unit of that coordinate.
     pub coordinate: &'a str,
+    /// Factor between the coordinate and the motion of the joint.
     pub ratio: f64,
 }
 

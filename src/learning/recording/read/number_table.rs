@@ -1,24 +1,14 @@
-//! States from CSV files.
+//! Named columns of CSV text, in any precision.
 
-use lnn::names::{nearest, pluralize, unknown};
-use lnn::recording::{Separator, comment, line_end, names_in, split};
-use lnn::scalar::Scalar;
+use super::text::{Separator, comment, line_end, names_in, split};
+use crate::names::{nearest, pluralize, unknown};
+use crate::scalar::Scalar;
+use std::ops::Range;
 use thiserror::Error;
 
-/// States of a file, in its order.
-#[derive(Clone, Debug, PartialEq)]
-pub struct States<S> {
-    /// Coordinates `(states, n)` in physical units.
-    pub q: Vec<S>,
-    /// Velocities `(states, n)` in physical units.
-    pub v: Vec<S>,
-    /// Line of the file, from 1, that each state is on.
-    pub rows: Vec<usize>,
-}
-
-/// Mistakes in a file of states; rows are lines of the file, from 1.
+/// A mistake in a table of numbers; rows are lines of the file, from 1.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum StatesError {
+pub enum NumberTableError {
     /// The file is empty.
     #[error("the file is empty, expected a header with the columns {0}")]
     Empty(String),
@@ -41,7 +31,7 @@ pub enum StatesError {
         /// Its name.
         name: String,
     },
-    /// The system does not have a column.
+    /// A column of another name.
     #[error("row {row}: {problem}")]
     Unknown {
         /// Row of the header.
@@ -80,50 +70,16 @@ pub enum StatesError {
         found: String,
     },
     /// There is a header but no rows.
-    #[error("no states below the header")]
-    NoStates,
+    #[error("no rows below the header")]
+    NoRows,
 }
 
-/// Reads states from CSV text.
-///
-/// The first line that is neither blank nor a comment, which begins with `#`, names the columns, all of `columns` (coordinates, then
-/// velocities) in any order; the last comment above numbers may do so too. Other columns, such as the time and the energy of a roll-out,
-/// are ignored. Fields are separated by commas, semicolons, tabs, bars or blanks, as in that line; spaces around them, double quotes, a
-/// byte order mark, blank lines and the line ends of Windows and of old Macs are accepted. Numbers are read in the precision of `S`: a
-/// double-double sees the decimal text, not its nearest `f64`.
-///
-/// # Errors
-/// [`StatesError`] naming the first offending row and column.
-pub fn parse_states<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<States<S>, StatesError> {
-    Ok(parse_states_at(bytes, columns, &[])?.0)
-}
-
-/// As [`parse_states`], with a column of times if one is named; otherwise the times are empty.
-///
-/// # Errors
-/// Those of [`parse_states`].
-pub fn parse_states_at<S: Scalar>(
-    bytes: &[u8],
-    columns: &[String],
-    time: &[String],
-) -> Result<(States<S>, Vec<S>), StatesError> {
-    let all = [columns, time].concat();
-    let Table { values, rows } = parse_table::<S>(bytes, &all)?;
-    let n = columns.len() / 2;
-    let (mut q, mut v) = (Vec::with_capacity(values.len() / 2), Vec::with_capacity(values.len() / 2));
-    let mut t = Vec::new();
-    for state in values.chunks_exact(all.len()) {
-        q.extend_from_slice(&state[..n]);
-        v.extend_from_slice(&state[n..2 * n]);
-        t.extend_from_slice(&state[2 * n..]);
-    }
-    Ok((States { q, v, rows }, t))
-}
-
-/// Columns of a file, in the order they were requested.
+/// Columns of a file of states or points, in the order they were requested.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table<S> {
-    /// Numbers, `(rows, columns)`.
+pub struct NumberTable<S> {
+    /// Number of columns.
+    width: usize,
+    /// Finite numbers, `(rows, columns)`.
     pub values: Vec<S>,
     /// Line of the file, from 1, that each row is on.
     pub rows: Vec<usize>,
@@ -139,11 +95,11 @@ struct Columns<'a> {
 }
 
 /// Finds the column names; `asked` are the columns that an error lists.
-fn opened<'a>(bytes: &'a [u8], asked: &str) -> Result<Columns<'a>, StatesError> {
+fn opened<'a>(bytes: &'a [u8], asked: &str) -> Result<Columns<'a>, NumberTableError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let row = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
-        StatesError::NotText(row)
+        NumberTableError::NotText(row)
     })?;
     let end = char::from(line_end(bytes));
     let rows =
@@ -151,7 +107,7 @@ fn opened<'a>(bytes: &'a [u8], asked: &str) -> Result<Columns<'a>, StatesError> 
     let remark = |line: &str| comment(line.trim().as_bytes()).is_some();
     let mut lines = rows().filter(move |(_, line)| !remark(line)).peekable();
     let above = rows().take_while(|(_, line)| remark(line)).last();
-    let &(first, header) = lines.peek().ok_or_else(|| StatesError::Empty(asked.to_string()))?;
+    let &(first, header) = lines.peek().ok_or_else(|| NumberTableError::Empty(asked.to_string()))?;
     let separator = Separator::of(header);
     let names: Vec<String> = split(header, separator).into_iter().map(String::from).collect();
     if names.iter().any(|name| name.parse::<f64>().is_err()) {
@@ -162,55 +118,68 @@ fn opened<'a>(bytes: &'a [u8], asked: &str) -> Result<Columns<'a>, StatesError> 
         let said = line.trim().trim_start_matches('#').trim();
         Some((row, names_in(said, names.len())?))
     });
-    let (row, names) = said.ok_or_else(|| StatesError::NoHeader { row: first, names: asked.to_string() })?;
+    let (row, names) = said.ok_or_else(|| NumberTableError::NoHeader { row: first, names: asked.to_string() })?;
     let names = names.into_iter().map(|name| name.to_string()).collect();
     Ok(Columns { row, names, separator, lines: Box::new(lines) })
 }
 
-/// Names of all columns of CSV text.
-///
-/// # Errors
-/// [`StatesError`] for text without a header.
-pub fn column_names(bytes: &[u8]) -> Result<Vec<String>, StatesError> {
-    Ok(opened(bytes, "of the data")?.names)
-}
-
-/// Reads columns from CSV text as [`parse_states`] does.
-///
-/// # Errors
-/// [`StatesError`] naming the first offending row and column.
-pub fn parse_table<S: Scalar>(bytes: &[u8], columns: &[String]) -> Result<Table<S>, StatesError> {
-    let Columns { row, names, separator, lines } = opened(bytes, &columns.join(","))?;
-    let order = read_header(row, &names, columns)?;
-    let mut table = Table { values: Vec::new(), rows: Vec::new() };
-    let mut state = vec![S::default(); columns.len()];
-    for (row, line) in lines {
-        let fields = split(line, separator);
-        if fields.len() != order.len() {
-            let (expected, separated, found) = (order.len(), separator.named(), fields.len());
-            return Err(StatesError::Ragged { row, expected, separated, found });
-        }
-        for (field, &column) in fields.into_iter().zip(&order) {
-            let Some(column) = column else { continue };
-            state[column] = S::parse(field).filter(|x| x.is_finite()).ok_or_else(|| StatesError::Field {
-                row,
-                column: columns[column].clone(),
-                found: field.chars().take(40).collect(),
-            })?;
-        }
-        table.values.extend_from_slice(&state);
-        table.rows.push(row);
+impl<S: Scalar> NumberTable<S> {
+    /// Names of all columns of CSV text.
+    ///
+    /// # Errors
+    /// [`NumberTableError`] for text without a header.
+    pub fn names(bytes: &[u8]) -> Result<Vec<String>, NumberTableError> {
+        Ok(opened(bytes, "of the data")?.names)
     }
-    if table.rows.is_empty() { Err(StatesError::NoStates) } else { Ok(table) }
+
+    /// Reads columns from CSV text.
+    ///
+    /// The first line that is neither blank nor a comment, which begins with `#`, names the columns, all of `columns` in any order; the last
+    /// comment above numbers may do so too. Other columns are ignored. Fields are separated by commas, semicolons, tabs, bars or blanks, as in
+    /// that line; spaces around them, double quotes, a byte order mark, blank lines and the line ends of Windows and of old Macs are accepted.
+    /// Numbers are read in the precision of `S`: a double-double sees the decimal text, not its nearest `f64`.
+    ///
+    /// # Errors
+    /// [`NumberTableError`] naming the first offending row and column.
+    pub fn read(bytes: &[u8], columns: &[String]) -> Result<Self, NumberTableError> {
+        let Columns { row, names, separator, lines } = opened(bytes, &columns.join(","))?;
+        let order = read_header(row, &names, columns)?;
+        let mut table = Self { width: columns.len(), values: Vec::new(), rows: Vec::new() };
+        let mut numbers = vec![S::default(); columns.len()];
+        for (row, line) in lines {
+            let fields = split(line, separator);
+            if fields.len() != order.len() {
+                let (expected, separated, found) = (order.len(), separator.named(), fields.len());
+                return Err(NumberTableError::Ragged { row, expected, separated, found });
+            }
+            for (field, &column) in fields.into_iter().zip(&order) {
+                let Some(column) = column else { continue };
+                numbers[column] = S::parse(field).filter(|x| x.is_finite()).ok_or_else(|| NumberTableError::Field {
+                    row,
+                    column: columns[column].clone(),
+                    found: field.chars().take(40).collect(),
+                })?;
+            }
+            table.values.extend_from_slice(&numbers);
+            table.rows.push(row);
+        }
+        if table.rows.is_empty() { Err(NumberTableError::NoRows) } else { Ok(table) }
+    }
+
+    /// Some columns of some rows, `(rows, columns)`; rows beyond the last one are left out.
+    pub fn part(&self, rows: Range<usize>, columns: Range<usize>) -> Vec<S> {
+        let all = self.values.chunks_exact(self.width).skip(rows.start).take(rows.len());
+        all.flat_map(|row| &row[columns.clone()]).copied().collect()
+    }
 }
 
 /// For every field of a row, the index of its column, if it has one.
-fn read_header(row: usize, names: &[String], columns: &[String]) -> Result<Vec<Option<usize>>, StatesError> {
+fn read_header(row: usize, names: &[String], columns: &[String]) -> Result<Vec<Option<usize>>, NumberTableError> {
     let mut order = Vec::with_capacity(names.len());
     for name in names {
         let column = columns.iter().position(|known| known == name);
         if column.is_some() && order.contains(&column) {
-            return Err(StatesError::Duplicate { row, name: name.clone() });
+            return Err(NumberTableError::Duplicate { row, name: name.clone() });
         }
         order.push(column);
     }
@@ -226,9 +195,9 @@ fn read_header(row: usize, names: &[String], columns: &[String]) -> Result<Vec<O
     match foreign().find(near).or_else(|| foreign().next().filter(|_| nothing_known)) {
         Some(name) => {
             let problem = unknown("column", name, columns.iter().map(String::as_str));
-            Err(StatesError::Unknown { row, problem })
+            Err(NumberTableError::Unknown { row, problem })
         }
-        None => Err(StatesError::Missing { row, names: missing.join(", ") }),
+        None => Err(NumberTableError::Missing { row, names: missing.join(", ") }),
     }
 }
 
@@ -242,21 +211,22 @@ mod tests {
     }
 
     fn refusal(text: &str) -> String {
-        parse_states::<f64>(text.as_bytes(), &columns()).unwrap_err().to_string()
+        NumberTable::<f64>::read(text.as_bytes(), &columns()).unwrap_err().to_string()
     }
 
     #[test]
     fn columns_come_in_any_order_and_dress() {
         let text = "\u{feff}\r\n\"theta2\", theta1 ,theta2_dot,theta1_dot\r\n 2,+1e0 ,4.,\"3\"\r\n\r\n-6,5,.8,7";
-        let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
-        assert_eq!(states.q, [1.0, 2.0, 5.0, -6.0]);
-        assert_eq!(states.v, [3.0, 4.0, 7.0, 0.8]);
+        let states = NumberTable::<f64>::read(text.as_bytes(), &columns()).unwrap();
+        assert_eq!(states.values, [1.0, 2.0, 3.0, 4.0, 5.0, -6.0, 7.0, 0.8]);
+        assert_eq!((states.part(0..9, 0..2), states.part(1..2, 2..4)), (vec![1.0, 2.0, 5.0, -6.0], vec![7.0, 0.8]));
         assert_eq!(states.rows, [3, 5]);
     }
 
     #[test]
     fn separators_and_comments_are_read() {
-        let expected = parse_states::<f64>(b"theta1,theta2,theta1_dot,theta2_dot\n1,-2,3,4.5\n", &columns()).unwrap();
+        let expected =
+            NumberTable::<f64>::read(b"theta1,theta2,theta1_dot,theta2_dot\n1,-2,3,4.5\n", &columns()).unwrap();
         for text in [
             "theta1;theta2;theta1_dot;theta2_dot\n1;-2;3;4.5\n",
             "theta1\ttheta2\ttheta1_dot\ttheta2_dot\n1\t-2\t3\t4.5\n",
@@ -266,18 +236,18 @@ mod tests {
             "theta1,theta2,theta1_dot,theta2_dot\r1,-2,3,4.5\r",
             "theta1,theta2,theta1_dot,theta2_dot\r\n1,-2,3,4.5\r\n",
         ] {
-            let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
-            assert_eq!((states.q, states.v, states.rows), (expected.q.clone(), expected.v.clone(), vec![2]), "{text}");
+            let states = NumberTable::<f64>::read(text.as_bytes(), &columns()).unwrap();
+            assert_eq!((states.values, states.rows), (expected.values.clone(), vec![2]), "{text}");
         }
         let text = "# by hand\n\ntheta1,theta2,theta1_dot,theta2_dot\n# first\n1,-2,3,4.5\n # last\n";
-        let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
-        assert_eq!((states.q, states.rows), (expected.q, vec![5]));
+        let states = NumberTable::<f64>::read(text.as_bytes(), &columns()).unwrap();
+        assert_eq!((states.values, states.rows), (expected.values, vec![5]));
     }
 
     #[test]
     fn headers_are_checked() {
         assert!(refusal("").starts_with("the file is empty"));
-        assert_eq!(refusal("theta1;theta2;theta1_dot;theta2_dot\n"), "no states below the header");
+        assert_eq!(refusal("theta1;theta2;theta1_dot;theta2_dot\n"), "no rows below the header");
         assert_eq!(refusal("theta1\ttheta2\n"), "row 1: missing column theta1_dot, theta2_dot");
         let expected = "row 2: expected a header with the columns theta1,theta2,theta1_dot,theta2_dot, found numbers";
         assert_eq!(refusal("# by hand\n1,2,3,4\n"), expected);
@@ -287,14 +257,14 @@ mod tests {
             "row 1: unknown column \"theta1_dto\", did you mean \"theta1_dot\"?"
         );
         assert_eq!(refusal("\ntheta1,theta2_dot\n"), "row 2: missing column theta2, theta1_dot");
-        assert_eq!(refusal("theta1,theta2,theta1_dot,theta2_dot\n\n"), "no states below the header");
+        assert_eq!(refusal("theta1,theta2,theta1_dot,theta2_dot\n\n"), "no rows below the header");
     }
 
     #[test]
     fn columns_of_a_roll_out_that_are_no_state_are_left_out() {
         let text = "t,theta1,theta2,theta1_dot,theta2_dot,energy\n0,1,2,3,4,nan\n0.1,5,6,7,8,x\n";
-        let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
-        assert_eq!((states.q, states.v), (vec![1.0, 2.0, 5.0, 6.0], vec![3.0, 4.0, 7.0, 8.0]));
+        let states = NumberTable::<f64>::read(text.as_bytes(), &columns()).unwrap();
+        assert_eq!(states.values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
         assert_eq!(refusal("t,theta1,theta2,theta1_dot\n"), "row 1: missing column theta2_dot");
         let near = refusal("t,theta1,theta2,theta1_dot,theta2_do\n");
         assert_eq!(near, "row 1: unknown column \"theta2_do\", did you mean \"theta2_dot\"?");
@@ -312,7 +282,7 @@ mod tests {
         assert_eq!(with("1,2,3"), "row 3: expected 4 fields, found 3");
         assert_eq!(with("1,2,3,4,"), "row 3: expected 4 fields, found 5");
         let bytes = b"theta1,theta2,theta1_dot,theta2_dot\n1,2,3,4\n1,\xff,3,4\n";
-        assert_eq!(parse_states::<f64>(bytes, &columns()), Err(StatesError::NotText(3)));
+        assert_eq!(NumberTable::<f64>::read(bytes, &columns()), Err(NumberTableError::NotText(3)));
     }
 
     proptest! {
@@ -322,16 +292,16 @@ mod tests {
         fn numbers_survive(values in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO, 4)) {
             let fields: Vec<String> = values.iter().map(|x| format!("{x:?}")).collect();
             let text = format!("theta1,theta2,theta1_dot,theta2_dot\n{}", fields.join(","));
-            let states = parse_states::<f64>(text.as_bytes(), &columns()).unwrap();
-            prop_assert_eq!([states.q, states.v].concat(), values);
+            let states = NumberTable::<f64>::read(text.as_bytes(), &columns()).unwrap();
+            prop_assert_eq!(states.values, values);
         }
 
         #[test]
         fn arbitrary_bytes_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             let text = [b"theta1,theta2,theta1_dot,theta2_dot\n".as_slice(), &bytes].concat();
-            let _ = parse_states::<f32>(&bytes, &columns());
-            if let Ok(states) = parse_states::<f64>(&text, &columns()) {
-                prop_assert!(states.q.iter().chain(&states.v).all(|x| x.is_finite()));
+            let _ = NumberTable::<f32>::read(&bytes, &columns());
+            if let Ok(states) = NumberTable::<f64>::read(&text, &columns()) {
+                prop_assert!(states.values.iter().all(|x| x.is_finite()));
             }
         }
     }

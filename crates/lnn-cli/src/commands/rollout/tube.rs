@@ -6,13 +6,10 @@ use crate::arguments::input;
 use crate::arguments::learned::model_file;
 use crate::arguments::number::{number, threads};
 use crate::arguments::recording_args::read;
-use lnn::analysis::{Tube, TubeError, Window, predict_by_motion};
-use lnn::data::{Split, StateEstimate};
+use lnn::analysis::{MotionTube, Tube, TubeError, Window, predict_by_motion};
 use lnn::lagrangian::EulerLagrange;
 use lnn::pipeline::{FitConfig, FitOptions, MAX_RESULT_BYTES, PreparedFit};
 use lnn::storage::read_regular;
-use serde::Serialize;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -26,25 +23,6 @@ pub struct TubeArgs {
     /// Recordings of other motions from which the tube is estimated, with the columns of the data that the model was fitted to.
     #[arg(long, value_name = "DATA,..", value_delimiter = ',', requires = "tube")]
     tube_data: Vec<PathBuf>,
-}
-
-/// A tube around a motion that starts at a given time.
-pub struct MotionTube {
-    tube: Tube,
-    start: f64,
-    coordinates: Vec<String>,
-}
-
-/// The description of a tube in JSON.
-#[derive(Debug, Serialize)]
-pub struct TubeFacts<'a> {
-    share: f64,
-    /// Number of motions that determined the shape, and number that determined the width.
-    motions: [usize; 2],
-    /// Times ahead in s.
-    times: &'a [f64],
-    /// Half of the width at these times.
-    half_widths: BTreeMap<&'a str, Vec<f64>>,
 }
 
 impl TubeArgs {
@@ -83,7 +61,7 @@ impl TubeArgs {
             )),
             error => CliError::data(format_args!("--tube {share}: {error}")),
         })?;
-        Ok(Some(MotionTube { tube, start, coordinates: coordinates.to_vec() }))
+        Ok(Some(MotionTube::new(tube, start, coordinates.to_vec())))
     }
 
     /// Beginnings of all motions that were not used for training and last at least `seconds`.
@@ -111,50 +89,6 @@ impl TubeArgs {
             options.held_out = 0.0;
         }
         let measured = PreparedFit::new(&reading, &options).map_err(CliError::data)?.measured;
-        Ok(beginnings(if self.tube_data.is_empty() { &measured.test } else { &measured.training }, seconds))
-    }
-}
-
-/// Beginnings of all motions of at least this length, from the first accurate state.
-fn beginnings(part: &Split, seconds: f64) -> Vec<Window> {
-    let n = part.recording.n();
-    let estimated = part.estimated();
-    let first = |(estimate, states): (&StateEstimate<'_>, &lnn::recording::Smoothed)| {
-        let samples = states.interior().start..states.times.len();
-        Window::cut(*estimate, samples, n, seconds).into_iter().next()
-    };
-    estimated.iter().zip(&part.states).filter_map(first).collect()
-}
-
-impl MotionTube {
-    /// Lower and upper limits at a sample.
-    pub fn ends<'a>(&self, t: f64, q: &'a [f64]) -> impl Iterator<Item = [f64; 2]> + use<'a> {
-        let half = self.tube.half_widths(t - self.start);
-        q.iter().zip(half).map(|(q, h)| [q - h, q + h])
-    }
-
-    /// Names of the columns, low and high for every coordinate.
-    pub fn names(&self) -> impl Iterator<Item = String> {
-        self.coordinates.iter().flat_map(|name| ["low", "high"].map(|end| format!("{name}_{end}")))
-    }
-
-    /// The JSON form.
-    pub fn facts(&self) -> TubeFacts<'_> {
-        let n = self.coordinates.len();
-        let half_widths = self.coordinates.iter().enumerate().map(|(i, name)| {
-            (name.as_str(), self.tube.half_widths.iter().skip(i).step_by(n).copied().collect::<Vec<f64>>())
-        });
-        TubeFacts {
-            share: self.tube.share,
-            motions: self.tube.motions,
-            times: &self.tube.times,
-            half_widths: half_widths.collect(),
-        }
-    }
-
-    /// Describes the tube in words.
-    pub fn text(&self) -> String {
-        let [scaling, scored] = self.tube.motions;
-        format!("tube for {} of whole motions, from {} motions\n", self.tube.share, scaling + scored)
+        Ok(Window::beginnings(if self.tube_data.is_empty() { &measured.test } else { &measured.training }, seconds))
     }
 }

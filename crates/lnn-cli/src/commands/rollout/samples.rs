@@ -1,13 +1,13 @@
 //! Writes the samples of a roll-out to a CSV: records them, adds further columns, and writes them as they arrive.
 
-use super::MotionRecord;
 use super::readings::ReadingColumns;
 use crate::CliError;
 use crate::arguments::input;
 use crate::arguments::motion_source::MotionSource;
-use crate::commands::tube::MotionTube;
 use crate::directories::files::cannot_write;
 use crate::terminal::output;
+use lnn::analysis::MotionTube;
+use lnn::report::MotionRecord;
 use lnn::rollout::{Trajectory, quoted};
 use lnn::scalar::Scalar;
 use lnn::storage::{AtomicWriter, Disk, remove_leftovers};

@@ -1,21 +1,17 @@
-//! Pictures of a roll-out: its coordinates over time, or a page.
+//! Pictures of a motion: its coordinates over time, or a page.
 
-use super::MotionRecord;
-use crate::CliError;
-use crate::commands::tube::MotionTube;
-use crate::directories::files::{cannot_write, ends_in};
-use lnn::report::{
+use super::record::MotionRecord;
+use crate::analysis::MotionTube;
+use crate::report::{
     LinePlot, Picture, PlotError, Polar, Report, Series, by_unit, figure, line_plot, trace_plot, with_unit,
 };
-use lnn::storage::write_atomically;
-use std::path::Path;
 
 /// Caption of a path that is coloured by time.
 const FROM_DARK: &str = "From dark (the start, a dot) to bright (the end).";
 
 /// Texts of the pictures of a motion.
 #[derive(Clone, Copy, Debug)]
-pub struct Texts<'a> {
+pub struct MotionTexts<'a> {
     /// Title.
     pub title: &'a str,
     /// Label of the parameter of the motion.
@@ -27,52 +23,62 @@ pub struct Texts<'a> {
 }
 
 impl MotionRecord {
-    /// Draws the coordinates against time in SVG, or a page of coordinates, velocities and energy as HTML, depending on the extension of
-    /// the file; with the limits of a tube around the coordinates, and with the path in the plane of polar coordinates.
+    /// Draws the coordinates against time, with the limits of a tube around them, and the path in the plane of polar ones, as SVG.
     ///
     /// # Errors
-    /// A data error for a motion that has no finite sample, or a file that cannot be written.
-    pub fn plot(&self, path: &Path, texts: &Texts<'_>, tube: Option<&MotionTube>) -> Result<(), CliError> {
+    /// [`PlotError::Empty`] for a motion that has no finite sample.
+    pub fn to_svg(&self, texts: &MotionTexts<'_>, tube: Option<&MotionTube>) -> Result<String, PlotError> {
+        let path = self.path(texts.units).filter(|path| !path.is_blank());
+        let coordinates = self.coordinates(texts, tube)?;
+        Ok(Picture::beside([coordinates].into_iter().chain(path)).to_svg(texts.title))
+    }
+
+    /// Draws the same with velocities and energy as a page.
+    ///
+    /// # Errors
+    /// Those of [`MotionRecord::to_svg`].
+    pub fn to_html(&self, texts: &MotionTexts<'_>, tube: Option<&MotionTube>) -> Result<String, PlotError> {
         let n = self.columns.len() / 2;
-        let (q, v) = texts.units.split_at(n);
+        let mut report = Report::new(texts.title);
+        if let Some(leaving) = &self.leaving {
+            report = report.paragraph(&format!("The motion {}.", leaving.text()));
+        }
+        let coordinates = self.coordinates(texts, tube)?;
+        let velocities = (&self.columns[n..], &texts.units[n..]);
+        let velocities = self.picture(velocities, &self.values[n..2 * n], texts.parameter)?;
+        let energy = ([texts.energy.to_string()], [String::new()]);
+        let energy = self.picture((&energy.0, &energy.1), &self.values[2 * n..], texts.parameter)?;
+        let parameter = texts.parameter.split(" [").next().unwrap_or_default();
+        let over = |what: &str, picture| figure("", format!("{what} against {parameter}"), Ok(picture), "");
+        let path = self.path(texts.units);
+        let figures = [
+            path.and_then(|picture| figure("", "The path in the plane", Ok(picture), FROM_DARK)),
+            over("Coordinates", coordinates),
+            over("Velocities", velocities),
+            over(&format!("{} of the model", capitalized(texts.energy)), energy),
+        ];
+        Ok(report.figures(figures.iter().flatten()).to_html())
+    }
+
+    /// The coordinates over time.
+    fn coordinates(&self, texts: &MotionTexts<'_>, tube: Option<&MotionTube>) -> Result<Picture, PlotError> {
+        let n = self.columns.len() / 2;
+        let q = &texts.units[..n];
         let (mut names, mut positions, mut units) = (self.columns[..n].to_vec(), self.values[..n].to_vec(), q.to_vec());
         if let Some(tube) = tube {
             names.extend(tube.names());
             positions.extend(self.ends(tube));
             units.extend(q.iter().flat_map(|unit| [unit.clone(), unit.clone()]));
         }
-        let coordinates = self.picture((&names, &units), &positions, texts.parameter)?;
-        let bytes = if ends_in(path, &EXTENSIONS[1..]) {
-            let mut report = Report::new(texts.title);
-            if let Some(leaving) = &self.leaving {
-                report = report.paragraph(&format!("The motion {}.", leaving.text()));
-            }
-            let velocities = self.picture((&self.columns[n..], v), &self.values[n..2 * n], texts.parameter)?;
-            let energy = ([texts.energy.to_string()], [String::new()]);
-            let energy = self.picture((&energy.0, &energy.1), &self.values[2 * n..], texts.parameter)?;
-            let parameter = texts.parameter.split(" [").next().unwrap_or_default();
-            let over = |what: &str, picture| figure("", format!("{what} against {parameter}"), Ok(picture), "");
-            let path = self.path(q).and_then(|picture| figure("", "The path in the plane", Ok(picture), FROM_DARK));
-            let figures = [
-                path,
-                over("Coordinates", coordinates),
-                over("Velocities", velocities),
-                over(&format!("{} of the model", capitalized(texts.energy)), energy),
-            ];
-            report.figures(figures.iter().flatten()).to_html().into_bytes()
-        } else {
-            let path = self.path(q).filter(|path| !path.is_blank());
-            Picture::beside([coordinates].into_iter().chain(path)).to_svg(texts.title).into_bytes()
-        };
-        write_atomically(path, &bytes).map_err(|e| cannot_write(path, e))
+        self.picture((&names, &units), &positions, texts.parameter)
     }
 
     /// The path in the plane, if the coordinates are polar.
     fn path(&self, units: &[String]) -> Option<Picture> {
-        let n = units.len();
+        let n = self.columns.len() / 2;
         let positions: Vec<f64> =
             (0..self.times.len()).flat_map(|k| self.values[..n].iter().map(move |values| values[k])).collect();
-        let trace = Polar::of(&self.columns[..n], units)?.trace(n, &[("", &positions)]);
+        let trace = Polar::of(&self.columns[..n], &units[..n])?.trace(n, &[("", &positions)]);
         trace_plot(&trace).ok()
     }
 
@@ -93,7 +99,7 @@ impl MotionRecord {
         (names, units): (&[String], &[String]),
         values: &[Vec<f64>],
         x_label: &str,
-    ) -> Result<Picture, CliError> {
+    ) -> Result<Picture, PlotError> {
         let panel = |(unit, members): (String, Vec<usize>)| {
             let label = members.iter().map(|&i| names[i].as_str()).collect::<Vec<_>>().join(", ");
             let (x_label, y_label) = (x_label.to_string(), with_unit(&label, &unit));
@@ -102,7 +108,7 @@ impl MotionRecord {
         };
         let drawn: Vec<Picture> = by_unit(units).into_iter().filter_map(|group| panel(group).ok()).collect();
         if drawn.is_empty() {
-            return Err(CliError::data(PlotError::Empty(names.join(", "))));
+            return Err(PlotError::Empty(names.join(", ")));
         }
         let rests = drawn.iter().all(Picture::is_blank);
         Ok(Picture::beside(drawn.into_iter().filter(|picture| rests || !picture.is_blank())))
@@ -117,13 +123,10 @@ fn capitalized(text: &str) -> String {
     text.chars().take(1).flat_map(char::to_uppercase).chain(text.chars().skip(1)).collect()
 }
 
-/// Extensions of picture files; all but the first belong to HTML pages.
-pub const EXTENSIONS: [&str; 3] = ["svg", "html", "htm"];
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lnn::rollout::{Domain, Trajectory};
+    use crate::rollout::{Domain, Trajectory};
 
     #[test]
     fn unlike_units_have_panels_of_their_own() {
@@ -134,20 +137,14 @@ mod tests {
         let later = q.map(|q| 2.0 * q);
         let (t, v) = (vec![0.0, 1.0], [1.0, 0.5, 2.0, 0.0].repeat(2));
         watch.add(&Trajectory { coordinates: 4, t, q: [q, later].concat(), v, energy: Some(vec![0.0; 2]) });
-        let directory = tempfile::tempdir().unwrap();
-        let drawn = |name: &str| {
-            let file = directory.path().join(name);
-            let texts = Texts { title: "Motion", parameter: "time [s]", energy: "energy", units: &units };
-            watch.plot(&file, &texts, None).unwrap();
-            std::fs::read_to_string(&file).unwrap()
-        };
+        let texts = MotionTexts { title: "Motion", parameter: "time [s]", energy: "energy", units: &units };
         // The temperature is 0 and is left out; r and phi have a path in the plane.
-        let svg = drawn("a.svg");
+        let svg = watch.to_svg(&texts, None).unwrap();
         for (label, count) in [(">r, z [m]<", 1), (">phi [rad]<", 1), (">h [K]<", 0), (">r cos phi [m]<", 1)] {
             assert_eq!(svg.matches(label).count(), count, "{label}");
         }
         // So is an energy of 0.
-        let page = drawn("a.html");
+        let page = watch.to_html(&texts, None).unwrap();
         assert!(page.matches("<figure").count() == 3 && page.contains(">r_dot, z_dot [m/s]<"), "{page}");
     }
 
