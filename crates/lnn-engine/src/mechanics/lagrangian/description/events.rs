@@ -1,10 +1,10 @@
 //! Events of a description: a roll-out finds the zeros of their formulas.
 
 use super::quantity::Decimal;
+use super::scope::{Scope, compiled};
 use super::{Description, DescriptionError};
-use crate::lagrangian::expression::{Compiler, Expression, Formula, Meaning, Value};
+use crate::lagrangian::expression::{Compiler, Formula};
 use crate::lagrangian::formula_events::FormulaEvent;
-use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::vec::Vec;
 #[cfg(feature = "serde")]
@@ -64,11 +64,10 @@ impl Description {
     pub(super) fn compiled_events(
         &self,
         compiler: &mut Compiler,
-        scope: &BTreeMap<String, Meaning>,
+        scope: &Scope,
     ) -> Result<Vec<FormulaEvent>, DescriptionError> {
         let mut read = |key: &str, text: &str, still: bool| -> Result<Formula, DescriptionError> {
-            let expression: Expression = text.parse().map_err(DescriptionError::formula(key))?;
-            let value: Value = compiler.add(&expression, scope, still).map_err(DescriptionError::formula(key))?;
+            let value = compiled(compiler, scope, (key, text), still)?;
             Ok(compiler.formula(value))
         };
         let mut events = Vec::with_capacity(self.events.len());

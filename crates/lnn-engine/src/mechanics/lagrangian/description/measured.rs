@@ -1,9 +1,9 @@
 //! Measured quantities of a description: formulas of sensor readings.
 
+use super::scope::{Scope, compiled};
 use super::{CoordinateDescription, Description, DescriptionError};
-use crate::lagrangian::expression::{Compiler, Expression, Meaning, Value};
+use crate::lagrangian::expression::{Compiler, Meaning};
 use crate::lagrangian::formula_readings::FormulaReading;
-use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::vec::Vec;
 #[cfg(feature = "serde")]
@@ -37,7 +37,7 @@ impl Description {
     pub(super) fn compiled_readings(
         &self,
         compiler: &mut Compiler,
-        scope: &BTreeMap<String, Meaning>,
+        scope: &Scope,
     ) -> Result<Vec<FormulaReading>, DescriptionError> {
         if self.measured.is_empty() {
             return Ok(Vec::new());
@@ -49,9 +49,7 @@ impl Description {
         for (name, own) in &self.measured {
             let key = |part: &str| format!("measured.{name}.{part}");
             self.check_reading(name, own)?;
-            let expression: Expression = own.formula.parse().map_err(DescriptionError::formula(key("formula")))?;
-            let value: Value =
-                compiler.add(&expression, scope, false).map_err(DescriptionError::formula(key("formula")))?;
+            let value = compiled(compiler, scope, (&key("formula"), &own.formula), false)?;
             let moves = |place: usize| place < n || place >= behind;
             if compiler.velocities(value).is_empty() && !compiler.positions(value).into_iter().any(moves) {
                 let problem = "expected a coordinate, a velocity or an acceleration in it";
@@ -73,10 +71,7 @@ impl Description {
     }
 
     /// Extends the names by inputs, then accelerations.
-    fn with_accelerations(
-        &self,
-        scope: &BTreeMap<String, Meaning>,
-    ) -> Result<BTreeMap<String, Meaning>, DescriptionError> {
+    fn with_accelerations(&self, scope: &Scope) -> Result<Scope, DescriptionError> {
         let mut scope = self.with_inputs(scope)?;
         for (i, CoordinateDescription { name, .. }) in self.coordinates.iter().enumerate() {
             let meaning = Meaning::Position(self.coordinates.len() + 1 + self.inputs.len() + i);

@@ -4,14 +4,19 @@
 //! a model file.
 
 mod chain;
+mod checks;
 mod events;
+mod formulas;
 mod measured;
+mod metric;
 #[cfg(feature = "serde")]
 pub mod pair;
 mod per_trajectory;
 mod quantity;
 #[cfg(feature = "serde")]
 mod read;
+mod scope;
+mod states;
 mod system;
 
 use super::constraints::ExpressionConstraints;
@@ -31,6 +36,7 @@ pub use chain::ShownLink;
 pub use chain::turned;
 use chain::{ChainDescription, LinkDescription};
 pub use chain::{inertia_symbols, loss_symbols};
+pub use checks::is_free_name;
 use events::EventDescription;
 use measured::MeasuredDescription;
 pub use per_trajectory::Per;
@@ -38,7 +44,6 @@ pub use per_trajectory::PerTrajectory;
 use quantity::{Decimal, Quantity};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
-pub use system::is_free_name;
 
 /// A system: coordinates, parameters, and a Lagrangian or a metric given as formulas.
 #[derive(Clone, Debug, PartialEq)]
