@@ -2,7 +2,7 @@
 
 use super::crossing::{Dense, Found, Watcher};
 use super::force::{Piece, pieces};
-use super::ode::{Adaptive, EarlyEnd, Integration, Project, Scan, StepNodes};
+use super::integration::{Adaptive, EarlyEnd, Integration, Project, Scan, StepNodes};
 use super::regular::Regularity;
 use super::run::{Keep, Nodes, Receivers, into_error};
 use super::thresholds::STEP_GROWTH_AFTER_BREAK;

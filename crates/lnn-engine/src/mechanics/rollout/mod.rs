@@ -31,6 +31,8 @@ mod flow;
 mod force;
 mod gauss;
 mod impact;
+mod integration;
+mod observer;
 mod ode;
 mod options;
 mod phase;

@@ -2,7 +2,7 @@
 
 use super::error::UnderflowCause;
 use super::fixed::Stepper;
-use super::ode::Adaptive;
+use super::integration::Adaptive;
 use super::thresholds::NEAR_CONSTRAINTS;
 use super::{
     Force, Integrable, Integrator, Occurrence, RolloutError, RolloutOptions, StepCounts, Trajectory, adaptive, fixed,
