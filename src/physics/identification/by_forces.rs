@@ -9,8 +9,9 @@
 
 use super::IdentifyError;
 use super::bootstrap::{self, Copies};
+use super::course::Segment;
 use super::covariance::Root;
-use super::follow::{Follower, Segment};
+use super::follow::Follower;
 use super::found::{Identified, Outlier, Residual, ResidualPath};
 use super::quality::{Evidence, correlation, mean_eigenvalue, outliers, over_noise, tail, typical_size};
 use super::smoothed::{Quantity, States};

@@ -6,7 +6,7 @@
 //! constant changes the constraints, and back onto the constraints by projection.
 
 use super::IdentifyError;
-use super::follow::{Course, Segment};
+use super::course::{Course, Segment};
 use super::solve::Problem;
 use super::thresholds::{FORCE_ROUNDING, LANES};
 use crate::constraints::OBEDIENCE;

@@ -4,7 +4,7 @@
 //! `S^-1 B S^-1` with the normal matrix `S` and the long-run covariance `B` of the scores. `B` is the mean of the outer products of their sums over
 //! all windows of one length, which is Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
 
-use super::follow::Segment;
+use super::course::Segment;
 use super::linear::times;
 use super::quality::tail;
 use super::solve::{Normal, Problem, batches};

@@ -4,8 +4,9 @@
 //! The criteria are ranks and determinants of the joint effect of all open directions, which do not depend on their basis. The advice is specific
 //! only if it is the same at every point along the open directions where the search may have ended.
 
+use super::course::Segment;
 use super::determined::{OpenDirection, echelon};
-use super::follow::{Follower, Segment};
+use super::follow::Follower;
 use super::moves::Group;
 use super::solve::Problem;
 use super::thresholds::{LANES, LEAST_EFFECT, MOST_PROBED_STATES, RECOMMENDED_GAIN, SINGULAR_ROUNDING, STANDSTILL};

@@ -9,7 +9,7 @@
 //! range stays there as long as the gradient points out of the range (Bertsekas, SIAM J. Control Optim. 20 (1982) 221).
 
 use super::closed::advance;
-use super::follow::Segment;
+use super::course::Segment;
 use super::linear::times;
 use super::solve::{Linear, Normal, Problem, Sensor, SensorKind};
 use super::thresholds::{

@@ -1,123 +1,13 @@
 //! Integrates many segments side by side, with derivatives by initial states and constants. Each segment is a lane of a batch.
 
-use super::Between;
 use super::closed::Closed;
-use crate::lagrangian::{Equations, Tangent};
+use super::course::{Course, Segment, forces};
+use super::lanes::State;
 use crate::linalg::{self, Workspace};
-use crate::recording::{RecordedTrajectory, Recording};
+use crate::recording::RecordedTrajectory;
 use crate::scalar::{update, update2};
 use crate::tape::Replay;
 use std::sync::Arc;
-
-/// Successive samples of a trajectory that are fitted by one motion, with its own initial state.
-#[derive(Clone, Debug)]
-pub(crate) struct Segment {
-    pub track: usize,
-    /// First sample, and number of samples.
-    pub first: usize,
-    pub samples: usize,
-    /// Position and velocity at the first sample, `(2, n)`.
-    pub start: Vec<f64>,
-}
-
-/// Everything that the integration needs: the recorded times and forces, and the equations.
-#[derive(Clone, Debug)]
-pub(crate) struct Course<'a> {
-    pub recording: &'a Recording,
-    pub equations: &'a Equations,
-    /// Number of constants by which derivatives are taken.
-    pub chosen: usize,
-    pub between: Between,
-    /// Inputs of every trajectory; empty for a system without inputs.
-    pub inputs: Vec<Inputs<'a>>,
-    /// Typical step between samples in s, and number of integration steps in it.
-    pub step: f64,
-    pub substeps: usize,
-}
-
-/// Measured functions of the time on which the forces depend.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Inputs<'a> {
-    /// Times of the samples.
-    pub times: &'a [f64],
-    /// Values, `(samples, inputs)`.
-    pub values: &'a [f64],
-}
-
-impl Course<'_> {
-    /// Writes the known functions at a time of a trajectory: the time itself, then the inputs.
-    pub(super) fn known(&self, track: usize, t: f64, into: &mut [f64]) {
-        into[0] = t;
-        let Some(Inputs { times, values }) = self.inputs.get(track) else { return };
-        let values_at = &mut into[1..];
-        values_at.fill(0.0);
-        let after = times.partition_point(|known| *known <= t).clamp(1, times.len().max(2) - 1).min(times.len() - 1);
-        let (before, after_time) = (times[after.saturating_sub(1)], times[after]);
-        let share = if after_time > before { ((t - before) / (after_time - before)).clamp(0.0, 1.0) } else { 1.0 };
-        let count = values_at.len();
-        self.between.weigh(times, (after, share), |at, weight| {
-            update(values_at, &values[at * count..], |x, value| *x += weight * value);
-        });
-    }
-}
-
-/// States of all lanes, `(lanes, n)`, with derivatives, `(lanes, n, columns)`.
-#[derive(Clone, Debug, Default)]
-pub(super) struct State {
-    pub q: Vec<f64>,
-    pub v: Vec<f64>,
-    pub q_slopes: Vec<f64>,
-    pub v_slopes: Vec<f64>,
-}
-
-impl State {
-    fn sized(lanes: usize, n: usize, columns: usize) -> Self {
-        let [state, slopes] = [lanes * n, lanes * n * columns].map(|size| vec![0.0; size]);
-        Self { q: state.clone(), v: state, q_slopes: slopes.clone(), v_slopes: slopes }
-    }
-
-    /// Derivatives of positions and velocities by the initial states, `(lanes, 2n, starts)`: the first of `columns` derivatives.
-    pub fn by_starts(&self, n: usize, (starts, columns): (usize, usize)) -> Vec<f64> {
-        let lane = |(q, v): (&[f64], &[f64])| {
-            let rows = q.chunks_exact(columns).chain(v.chunks_exact(columns));
-            rows.flat_map(|row| &row[..starts]).copied().collect::<Vec<f64>>()
-        };
-        let lanes = self.q_slopes.chunks_exact(n * columns).zip(self.v_slopes.chunks_exact(n * columns));
-        lanes.flat_map(lane).collect()
-    }
-
-    /// Sets the derivatives at the beginning of segments under constraints: the tangents of the constraints.
-    fn begin_within(&mut self, n: usize, columns: usize, tangents: &[Tangent]) {
-        for (lane, Tangent { free, following }) in tangents.iter().enumerate() {
-            let directions = free.chunks_exact(2 * n).chain(following.chunks_exact(2 * n));
-            for (column, direction) in directions.enumerate() {
-                for i in 0..n {
-                    let at = (lane * n + i) * columns + column;
-                    (self.q_slopes[at], self.v_slopes[at]) = (direction[i], direction[n + i]);
-                }
-            }
-        }
-    }
-
-    /// Sets the state to `from + h along`, with `h` of each lane; `widths` are the numbers of a lane in states and derivatives.
-    fn set_step(&mut self, from: &Self, (h, widths): (&[f64], [usize; 2]), along: &Self) {
-        let [n, columns] = widths;
-        add(&mut self.q, &from.q, (h, n), &along.q);
-        add(&mut self.v, &from.v, (h, n), &along.v);
-        add(&mut self.q_slopes, &from.q_slopes, (h, columns), &along.q_slopes);
-        add(&mut self.v_slopes, &from.v_slopes, (h, columns), &along.v_slopes);
-    }
-}
-
-fn add(to: &mut [f64], from: &[f64], (h, width): (&[f64], usize), slope: &[f64]) {
-    if width == 0 {
-        return;
-    }
-    for (lane, h) in h.iter().enumerate().take(to.len() / width) {
-        let at = lane * width..(lane + 1) * width;
-        update2(&mut to[at.clone()], &from[at.clone()], &slope[at], |to, from, slope| *to = from + h * slope);
-    }
-}
 
 /// Evaluates and integrates the equations of motion of many states side by side, with reused buffers.
 pub(super) struct Follower<'a> {
@@ -473,17 +363,4 @@ impl Scratch {
     fn like(state: &State) -> Self {
         Self { stage: state.clone(), rates: std::array::from_fn(|_| state.clone()) }
     }
-}
-
-/// Known forces `(n)` at the share `x` of the interval that ends at a sample; 0 for a trajectory without known forces.
-pub(super) fn forces(track: &RecordedTrajectory, between: Between, (sample, x): (usize, f64), into: &mut [f64]) {
-    let n = into.len();
-    into.fill(0.0);
-    if track.force.is_empty() {
-        return;
-    }
-    between.weigh(&track.times, (sample, x), |at, weight| {
-        let row = &track.force[at * n..][..n];
-        update(into, row, |force, known| *force += weight * known);
-    });
 }

@@ -1,7 +1,7 @@
 //! The result of an identification.
 
 use super::by_trajectory::ByTrajectory;
-use super::follow::Segment;
+use super::course::Segment;
 use super::thresholds::NEAR_DECREMENT;
 use super::{Between, Verdict};
 use crate::recording::{LoadedRecording, Recording};

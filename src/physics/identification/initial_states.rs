@@ -2,8 +2,8 @@
 //! beginning of a trajectory, with the constants at their starting values. From the best of them, the constants are fitted too, to a part of the
 //! recording that doubles as long as the model fits. The rest of the recording is divided into segments that continue this motion.
 
+use super::course::Segment;
 use super::cure::{POSITION, VELOCITY, spread};
-use super::follow::Segment;
 use super::pieces::Pieces;
 use super::solve::{Normal, Problem};
 use super::stages::{Fitted, choose_steps, refit};

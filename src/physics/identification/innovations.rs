@@ -7,8 +7,8 @@
 //! that least squares on its output are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989,
 //! sections 3.4 and 7.3).
 
+use super::course::Segment;
 use super::covariance::Root;
-use super::follow::Segment;
 use super::linear::{inverses, part};
 use super::solve::{Linear, Problem};
 use super::thresholds::{

@@ -4,7 +4,9 @@
 //! `A = a_q Q + a_v V + a_p` follows from the equations of motion.
 
 use super::IdentifyError;
-use super::follow::{Course, Follower, Segment, State};
+use super::course::{Course, Segment};
+use super::follow::Follower;
+use super::lanes::State;
 use super::solve::Problem;
 use super::thresholds::LEAST_SEGMENT;
 use crate::lagrangian::SystemInstance;

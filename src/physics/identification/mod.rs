@@ -34,6 +34,7 @@ mod choices;
 mod closed;
 #[cfg(test)]
 mod closed_tests;
+mod course;
 mod covariance;
 mod cure;
 mod descent;
@@ -46,6 +47,7 @@ mod initial_states;
 mod innovations;
 mod interpolations;
 mod invariants;
+mod lanes;
 pub(crate) mod linear;
 mod measured;
 mod motion_result;
@@ -67,8 +69,8 @@ mod unknowns;
 mod verdict;
 
 pub use by_trajectory::{ByTrajectory, OfTrajectory, Scatter};
+pub(crate) use course::{Course, Segment};
 pub use error::IdentifyError;
-pub(crate) use follow::{Course, Segment};
 pub use found::{
     Bodies, Combination, Constant, Correlations, Identified, Outlier, Residual, ResidualPath, SensorConstant,
     Undetermined,

@@ -1,7 +1,7 @@
 //! The result of a fit to motion: residuals, verdict and standard errors.
 
+use super::course::Segment;
 use super::covariance::{Root, Weighting, agreement, continuation, long_run, scores};
-use super::follow::Segment;
 use super::found::{Identified, Residual, ResidualPath};
 use super::quality::{
     Correlation, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, typical_size,

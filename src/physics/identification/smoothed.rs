@@ -2,7 +2,8 @@
 
 use super::averages::Averages;
 use super::closed::FreePart;
-use super::follow::{Follower, forces};
+use super::course::forces;
+use super::follow::Follower;
 use super::linear::Products;
 use super::solve::{Normal, Problem};
 use super::thresholds::{

@@ -2,9 +2,11 @@
 //!
 //! Every segment has an initial state of its own, which is eliminated from the normal equations.
 
+use super::course::{Course, Segment};
 use super::descent::Spectrum;
-use super::follow::{Course, Follower, Segment, State};
+use super::follow::Follower;
 use super::innovations::{Disturbances, Filter};
+use super::lanes::State;
 use super::linear::{inverse_with, times};
 use super::measured::{Measured, ReadingSlopes};
 use super::thresholds::{FAILED_SQUARE, GIVEN_WEIGHT, HUBER, LANES, RIDGE, START_ROUNDS};

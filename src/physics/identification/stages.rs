@@ -2,8 +2,8 @@
 
 use super::by_trajectory::by_trajectory;
 use super::choices::{check_errors, chosen, fitted_quantity, inputs, missing, sensors};
+use super::course::{Course, Segment};
 use super::first_fit::first_fit;
-use super::follow::{Course, Segment};
 use super::found::Identified;
 use super::initial_states::SEARCHED;
 use super::innovations::Disturbances;
