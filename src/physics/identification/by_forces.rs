@@ -11,12 +11,12 @@ use super::IdentifyError;
 use super::bootstrap::{self, Copies};
 use super::course::Segment;
 use super::covariance::Root;
+use super::fitted::Fitted;
 use super::follow::Follower;
 use super::found::{Identified, Outlier, Residual, ResidualPath};
 use super::quality::{Evidence, correlation, mean_eigenvalue, outliers, over_noise, tail, typical_size};
 use super::smoothed::{Quantity, States};
 use super::solve::{Normal, Problem};
-use super::stages::Fitted;
 use super::thresholds::{
     COPIES, DRIFT_BLOCKS, LANES, LEAST_FORCE_RESIDUAL, LEAST_FORCE_UNIT, OUTLIER, SIGNIFICANCE, SLOPE_ROUNDING,
     WEIGHT_CHANGE, WEIGHT_UPDATES, WINDOW_OVER_HALF_WIDTH,

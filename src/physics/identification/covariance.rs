@@ -5,10 +5,12 @@
 //! all windows of one length, which is Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
 
 use super::course::Segment;
+use super::fitted::Fitted;
 use super::linear::times;
 use super::quality::tail;
+use super::segments::joined;
 use super::solve::{Normal, Problem, batches};
-use super::stages::{Fitted, choose_steps, joined};
+use super::steps::choose_steps;
 use super::thresholds::{ELIMINATED_ROUNDING, HUBER, LEAST_SEGMENT_EIGENVALUE, MOST_START_DECREMENT, MOST_WINDOW};
 use crate::linalg::{Workspace, dot, eigh};
 

@@ -4,9 +4,10 @@
 
 use super::course::Segment;
 use super::cure::{POSITION, VELOCITY, spread};
+use super::fitted::{Fitted, refit};
 use super::pieces::Pieces;
 use super::solve::{Normal, Problem};
-use super::stages::{Fitted, choose_steps, refit};
+use super::steps::choose_steps;
 use super::thresholds::{
     CONTINUED_STARTS, ENOUGH_SEGMENTS, EQUAL_STARTS, ITERATIONS, LANES, MOST_CONTINUED_SQUARE, PROMISING_STARTS,
     SEARCH_ROUNDS, SEGMENTS_BEFORE_CONSTANTS,

@@ -1,8 +1,8 @@
 //! Chooses the interpolation of known forces between the samples, and widens the standard errors if several interpolations fit equally well.
 
+use super::fitted::{Fitted, refit};
 use super::found::Identified;
 use super::solve::Problem;
-use super::stages::{Fitted, refit};
 use super::thresholds::{EQUAL_FIT_INCREASE, FEW_START_ROUNDS, ITERATIONS, RIVAL_DIFFERENCE};
 use super::{Between, IdentifyOptions};
 

@@ -41,6 +41,7 @@ mod descent;
 mod determined;
 mod error;
 mod first_fit;
+mod fitted;
 mod follow;
 mod found;
 mod initial_states;
@@ -57,11 +58,14 @@ mod per_trajectory;
 mod pieces;
 mod quality;
 mod report;
+mod residual_noise;
 #[cfg(test)]
 mod search_tests;
+mod segments;
 mod smoothed;
 mod solve;
 mod stages;
+mod steps;
 #[cfg(test)]
 mod tests;
 mod thresholds;
@@ -77,9 +81,11 @@ pub use found::{
 };
 pub(crate) use innovations::Disturbances;
 pub use options::IdentifyOptions;
+pub(crate) use segments::{joined, thinned};
 pub(crate) use solve::{Linear, Problem};
 pub use stages::identify;
-pub(crate) use stages::{choose_steps, joined, spread_of, thinned};
+pub(crate) use stages::spread_of;
+pub(crate) use steps::choose_steps;
 pub use verdict::Verdict;
 
 pub use crate::rollout::Between;

@@ -2,13 +2,14 @@
 
 use super::course::Segment;
 use super::covariance::{Root, Weighting, agreement, continuation, long_run, scores};
+use super::fitted::Fitted;
 use super::found::{Identified, Residual, ResidualPath};
 use super::quality::{
     Correlation, Evidence, correlation, innovations, mean_eigenvalue, outliers, over_noise, typical_size,
 };
+use super::segments::typical_samples;
 use super::smoothed::Quantity;
 use super::solve::{Normal, Problem};
-use super::stages::{Fitted, typical_samples};
 use super::thresholds::{EXACT_RESIDUAL, LEAST_FREEDOM, SIGNIFICANCE};
 use super::unknowns::unknowns;
 use super::verdict::Verdict;

@@ -3,12 +3,12 @@
 use super::bodies;
 use super::cure::{Examiner, LinearDirections};
 use super::determined::{Determined, echelon};
+use super::fitted::Fitted;
 use super::found::{Combination, Constant, Correlations, Identified, SensorConstant, Undetermined};
 use super::invariants::{Invariant, Kind, unit_of, written};
 use super::moves::{Group, Moves, nearest};
 use super::smoothed::Quantity;
 use super::solve::{Normal, Problem, Sensor, SensorKind};
-use super::stages::Fitted;
 use super::thresholds::{NO_DEPENDENCE, SUM_ROUNDING};
 use crate::lagrangian::SystemInstance;
 use crate::names::rounded;
