@@ -43,6 +43,8 @@ mod error;
 mod first_fit;
 mod fitted;
 mod follow;
+#[cfg(test)]
+mod forced_tests;
 mod found;
 mod initial_states;
 mod innovations;
