@@ -11,6 +11,7 @@ pub(crate) mod phase;
 mod problem;
 mod recipe;
 pub(crate) mod reduction;
+mod shard;
 pub(crate) mod solver;
 mod thresholds;
 pub(crate) mod trainer;
