@@ -6,7 +6,7 @@ use crate::readings::shown;
 use crate::subject::{Subject, degrees_of};
 use lnn::geometry::{Change, Surface};
 use lnn::lagrangian::Interruptible;
-use lnn::symmetry::{Basis, ComparisonSummary, Comparison, enough, most_states, unknowns};
+use lnn::symmetry::{Basis, Comparison, ComparisonSummary, enough, most_states, unknowns};
 use pyo3::prelude::*;
 
 /// What two Lagrangians of the same coordinates have in common beyond factor and gauge, as JSON.

@@ -4,7 +4,7 @@ use crate::attend::whole;
 use crate::errors::{pipeline, runtime, value};
 use crate::recorded::{Motion, Source};
 use crate::subject::Subject;
-use lnn::constraints::{ConstraintSearch, MotionSamples, FoundConstraints};
+use lnn::constraints::{ConstraintSearch, FoundConstraints, MotionSamples};
 use lnn::findings::Findings;
 use lnn::formula::{Families, FormulaOptions, FoundFormula, MOST_BOOTSTRAPS};
 use lnn::identification::{Between, IdentifyOptions, identify as identified};

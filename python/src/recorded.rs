@@ -2,10 +2,7 @@
 
 use crate::errors::{pipeline, value};
 use lnn::pipeline::PipelineError;
-use lnn::recording::{
-    ColumnGuess, Columns, DataError, Guess, LoadedRecording, RecordedTrajectory, Recording, factor, 
-    
-};
+use lnn::recording::{ColumnGuess, Columns, DataError, Guess, LoadedRecording, RecordedTrajectory, Recording, factor};
 use pyo3::prelude::*;
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -5,7 +5,7 @@ use crate::errors::{choice, value};
 use crate::readings::shown;
 use crate::subject::Subject;
 use lnn::pipeline::Event;
-use lnn::relativity::{Camera, Chart, NamedMetric, Observer, ShadowSummary, Tracing, time_moves_alone, View};
+use lnn::relativity::{Camera, Chart, NamedMetric, Observer, ShadowSummary, Tracing, View, time_moves_alone};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::atomic::{AtomicUsize, Ordering};
