@@ -1,7 +1,8 @@
 //! Forces from outside as Python gives them, and the forces that make a known motion.
 
+use crate::arrays::{Numbers, slice, times};
 use crate::errors::value;
-use crate::subject::{Subject, slice, times};
+use crate::subject::Subject;
 use lnn::lagrangian::{ForceParts, Inputs, InverseDynamics, force_parts_by_rows, inverse_dynamics_by_rows};
 use lnn::rollout::{Between, Force, SampledForce};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
@@ -110,8 +111,6 @@ impl Forces {
         self.called.as_ref()?.raised.lock().ok()?.take()
     }
 }
-
-type Numbers<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Forces that give states `(b, n)` their accelerations, flat: generalized, friction, external, of constraints, multipliers, then the parts
 /// inertial, Coriolis and gravity; empty where there are none. A system that depends on the time needs the times `(b)`.

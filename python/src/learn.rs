@@ -1,10 +1,11 @@
 //! Trainings and fits.
 
+use crate::arrays::slice;
 use crate::attend::attended;
 use crate::errors::{choice, pipeline, runtime, value};
 use crate::readings::said;
 use crate::recorded::{Motion, Source};
-use crate::subject::{Subject, slice, values};
+use crate::subject::{Subject, values};
 use lnn::configuration::{Config, Known, Precision};
 use lnn::data::Dataset;
 use lnn::findings::Findings;
@@ -161,7 +162,8 @@ pub fn sweep(
     let parsed = configurations.into_iter().map(|(choice, text)| Ok((choice, serde_json::from_str(&text)?)));
     let parsed: Vec<(Vec<(String, String)>, Config)> =
         parsed.collect::<Result<_, serde_json::Error>>().map_err(value)?;
-    let swept = attended(py, progress.as_ref(), |watch| lnn::pipeline::Sweep::run(parsed, plan, (&out.0, out.1), &watch))?;
+    let swept =
+        attended(py, progress.as_ref(), |watch| lnn::pipeline::Sweep::run(parsed, plan, (&out.0, out.1), &watch))?;
     let Swept { rows, finished, findings } = swept.map_err(pipeline)?;
     Ok((serde_json::to_string(&rows).map_err(runtime)?, said(&findings), finished))
 }

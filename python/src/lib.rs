@@ -1,15 +1,21 @@
 //! The compiled part of the Python package `lnn`: arrays in, calls of the library, arrays and JSON out. It has no logic of its own; names,
 //! defaults and documentation are those of the Python side.
 
+mod arrays;
 mod attend;
 mod compare;
 mod errors;
 mod forces;
 mod learn;
+mod methods;
+mod motions;
 mod readings;
 mod recorded;
 mod shadow;
 mod subject;
+mod systems;
+mod tensors;
+mod terms;
 
 use pyo3::prelude::*;
 
@@ -17,9 +23,9 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _lnn(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<subject::Subject>()?;
-    module.add_function(wrap_pyfunction!(subject::systems, module)?)?;
-    module.add_function(wrap_pyfunction!(subject::read_robot, module)?)?;
-    module.add_function(wrap_pyfunction!(subject::rewritten_robot, module)?)?;
+    module.add_function(wrap_pyfunction!(systems::systems, module)?)?;
+    module.add_function(wrap_pyfunction!(systems::read_robot, module)?)?;
+    module.add_function(wrap_pyfunction!(systems::rewritten_robot, module)?)?;
     module.add_function(wrap_pyfunction!(learn::configuration, module)?)?;
     module.add_function(wrap_pyfunction!(learn::train, module)?)?;
     module.add_function(wrap_pyfunction!(learn::learn, module)?)?;
