@@ -1,6 +1,9 @@
 //! Tests of the constraint search on motions whose constraints are known.
 
+use super::independence::{extend, least_part};
+use super::thresholds::NEARLY_DEPENDENT;
 use super::*;
+use crate::linalg::dot;
 use crate::recording::smooth::SmoothOptions;
 use crate::recording::{RecordedTrajectory, Recording};
 use rand::{Rng, SeedableRng};
