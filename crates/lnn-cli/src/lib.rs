@@ -10,9 +10,6 @@
 mod arguments;
 mod commands;
 mod directories;
-#[cfg(test)]
-#[path = "../../lnn-engine/src/properties.rs"]
-mod properties;
 mod terminal;
 mod thresholds;
 

@@ -135,9 +135,9 @@ pub struct ShownLink<'a> {
     pub parent: usize,
     /// `true` if its joint is prismatic.
     pub prismatic: bool,
-    /// The coordinate that moves it, and its motion per unit of that coordinate.
+    /// The coordinate that moves it.
     pub coordinate: &'a str,
-    /// Factor between the coordinate and the motion of the joint.
+    /// Motion of the joint per unit of the coordinate.
     pub ratio: f64,
 }
 
