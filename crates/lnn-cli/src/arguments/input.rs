@@ -1,6 +1,9 @@
 //! Files that a command reads; `-` is standard input.
 
 use crate::CliError;
+use crate::thresholds::MAX_STATES_BYTES;
+use lnn::recording::NumberTable;
+use lnn::scalar::Scalar;
 use lnn::storage::{ReadError, read_regular};
 use std::io::Read;
 use std::path::Path;
@@ -27,6 +30,14 @@ pub fn place(out: &Path) -> String {
 pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, CliError> {
     let bytes = if is_standard(path) { bounded(std::io::stdin().lock(), limit) } else { read_regular(path, limit) };
     bytes.map_err(|error| CliError::input(path, error))
+}
+
+/// Reads columns of numbers from a file of states or points, or from standard input.
+///
+/// # Errors
+/// A data error that names the file and the first mistake in it.
+pub fn table<S: Scalar>(path: &Path, columns: &[String]) -> Result<NumberTable<S>, CliError> {
+    NumberTable::read(&read(path, MAX_STATES_BYTES)?, columns).map_err(|error| CliError::input(path, error))
 }
 
 /// Reads an input to its end, but at most `limit` bytes.

@@ -19,6 +19,18 @@ pub enum Precision {
     Dd,
 }
 
+/// Calls a function that is generic over the scalar in a [`Precision`].
+macro_rules! in_precision {
+    ($precision:expr, $function:ident($argument:expr)) => {
+        match $precision {
+            $crate::arguments::number::Precision::F32 => $function::<f32>($argument),
+            $crate::arguments::number::Precision::F64 => $function::<f64>($argument),
+            $crate::arguments::number::Precision::Dd => $function::<lnn::scalar::Dd>($argument),
+        }
+    };
+}
+pub(crate) use in_precision;
+
 /// A parser of one value of a type by its name; the help describes each value.
 pub fn choice<T: Copy + Send + Sync>(
     all: &'static [T],

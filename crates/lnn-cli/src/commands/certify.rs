@@ -2,7 +2,7 @@
 
 use crate::CliError;
 use crate::arguments::learned::Learned;
-use crate::arguments::number::{finite, index_of, range, seconds, thread_count, threads, whole};
+use crate::arguments::number::{finite, indices_of, range, seconds, thread_count, threads, whole};
 use crate::arguments::source::{SystemOrModel, require_at_most};
 use crate::arguments::system_arg::{self, learned_system};
 use crate::terminal::format::FormatArgs;
@@ -132,11 +132,8 @@ impl Args {
     fn region(&self, columns: &[String], usual: Bounds) -> Result<Bounds, CliError> {
         let n = columns.len() / 2;
         let mut bounds = usual;
-        for (k, (name, range)) in self.region.iter().enumerate() {
-            let place = index_of("--box", "column", name, columns)?;
-            if self.region[..k].iter().any(|(earlier, _)| earlier == name) {
-                return Err(CliError::usage(format_args!("--box: column {name} is given twice")));
-            }
+        let names: Vec<String> = self.region.iter().map(|(name, _)| name.clone()).collect();
+        for (place, (_, range)) in indices_of("--box", "column", &names, columns)?.into_iter().zip(&self.region) {
             let side = if place < n { &mut bounds.positions[place] } else { &mut bounds.velocities[place - n] };
             *side = *range;
         }

@@ -2,15 +2,14 @@
 
 use crate::CliError;
 use crate::arguments::input;
-use crate::arguments::number::{Precision, indices_of, list, named, whole};
+use crate::arguments::number::{Precision, in_precision, indices_of, list, named, whole};
 use crate::arguments::source::{Source, SystemOrModel, require_at_most};
 use crate::terminal::format::print_rows;
 use crate::terminal::output;
-use crate::thresholds::{MAX_STATES_BYTES, MOST_METRIC_COORDINATES, MOST_PIECES, ROWS_AT_ONCE};
+use crate::thresholds::{MOST_METRIC_COORDINATES, MOST_PIECES, ROWS_AT_ONCE};
 use lnn::geometry::{GeometryError, MOST_COORDINATES, PointReport, SurfaceReport, at_once, depends_on_velocity};
 use lnn::lagrangian::EulerLagrange;
-use lnn::recording::NumberTable;
-use lnn::scalar::{Dd, Real, Scalar};
+use lnn::scalar::{Real, Scalar};
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -70,11 +69,7 @@ enum Format {
 /// # Errors
 /// A usage or data error; after the last point, a data error if the metric of any point is degenerate or not finite.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    match args.precision {
-        Precision::F32 => geometry::<f32>(args),
-        Precision::F64 => geometry::<f64>(args),
-        Precision::Dd => geometry::<Dd>(args),
-    }
+    in_precision!(args.precision, geometry(args))
 }
 
 fn geometry<S: Scalar>(args: &Args) -> Result<(), CliError> {
@@ -135,9 +130,7 @@ impl<S: Scalar> Metric<'_, S> {
     /// Prints the geometry of the points of a file.
     fn print_points(&self, file: &Path) -> Result<(), CliError> {
         let n = self.names.len();
-        let bytes = input::read(file, MAX_STATES_BYTES)?;
-        let table = NumberTable::<S>::read(&bytes, self.names).map_err(|e| CliError::input(file, e))?;
-        drop(bytes);
+        let table = input::table::<S>(file, self.names)?;
         self.note_velocity(&table.values[..n]);
         print_rows(file, &table.rows, at_once(n).min(ROWS_AT_ONCE), |places| {
             let points = table.part(places.clone(), 0..n);

@@ -2,17 +2,17 @@
 
 use crate::CliError;
 use crate::arguments::input;
-use crate::arguments::number::{Precision, list};
+use crate::arguments::number::{Precision, in_precision, list};
 use crate::arguments::source::{Source, SystemOrModel};
 use crate::commands::constraints::constrained;
 use crate::commands::inverse::inverse;
 use crate::terminal::format::{Format, chunk, print_rows};
 use crate::terminal::output;
-use crate::thresholds::{EXAMINED_MOTION_STATES, MAX_STATES_BYTES};
+use crate::thresholds::EXAMINED_MOTION_STATES;
 use lnn::analysis::StateReporter;
 use lnn::lagrangian::{EulerLagrange, LeastNorm};
 use lnn::recording::NumberTable;
-use lnn::scalar::{Dd, Scalar};
+use lnn::scalar::Scalar;
 use lnn::symmetry::{Canonical, CanonicalForm};
 use std::path::PathBuf;
 
@@ -78,11 +78,7 @@ pub struct Args {
 /// A usage or data error; after the last state, a data error if any state had a singular mass matrix or a term that is
 /// not finite.
 pub fn run(args: &Args) -> Result<(), CliError> {
-    match args.precision {
-        Precision::F32 => inspect::<f32>(args),
-        Precision::F64 => inspect::<f64>(args),
-        Precision::Dd => inspect::<Dd>(args),
-    }
+    in_precision!(args.precision, inspect(args))
 }
 
 fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
@@ -102,9 +98,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
     let time = source.model.is_timed().then(|| "t".to_string());
     let width = 2 * n + time.iter().len();
     let columns: Vec<String> = source.columns.iter().cloned().chain(time).collect();
-    let bytes = input::read(file, MAX_STATES_BYTES)?;
-    let table = NumberTable::<S>::read(&bytes, &columns).map_err(|e| CliError::input(file, e))?;
-    drop(bytes);
+    let table = input::table::<S>(file, &columns)?;
     let (model, factor) = requested(args, source.model, &source.columns, &table)?;
     let mut reporter = StateReporter::new(model.as_ref(), args.linearize, factor);
     print_rows(file, &table.rows, chunk(n), |places| {
