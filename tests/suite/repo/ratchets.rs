@@ -28,6 +28,24 @@ fn longest(lines: &[&str]) -> usize {
     (0..lines.len()).filter(|&at| starts(lines[at])).map(end).max().unwrap_or(0)
 }
 
+/// Lines of a command without its imports and its declared arguments.
+fn own_lines(lines: &[&str]) -> usize {
+    let mut rest = lines;
+    let mut count = 0;
+    while let [first, ..] = rest {
+        let is_import = ["use ", "pub use ", "mod "].iter().any(|start| first.starts_with(start));
+        let is_declared = first.starts_with("#[derive(") && first.contains("clap::");
+        let end = match (is_import, is_declared) {
+            (true, _) => rest.iter().position(|line| line.ends_with(';')),
+            (_, true) => rest.iter().position(|line| line.starts_with('}')),
+            _ => None,
+        };
+        count += usize::from(!is_import && !is_declared);
+        rest = &rest[end.unwrap_or(0) + 1..];
+    }
+    count
+}
+
 /// `true` for a numeric constant, also of several numbers, of a module or within a function.
 fn is_number(line: &str) -> bool {
     let line = line.trim_start();
@@ -63,6 +81,9 @@ fn counts() -> BTreeMap<String, usize> {
     let (largest, function) = sizes.fold((0, 0), |most, lines| (most.0.max(lines.len()), most.1.max(longest(&lines))));
     counts.insert("lines of code of the largest file".into(), largest);
     counts.insert("lines of the longest function".into(), function);
+    let commands = sources.iter().filter(|(name, _)| name.starts_with("cli/commands/"));
+    let command = commands.map(|(_, code)| own_lines(&lines(code))).max().unwrap_or(0);
+    counts.insert("lines of the longest command without its imports and declared arguments".into(), command);
     counts.insert("files of the fullest folder".into(), folders.into_values().max().unwrap_or(0));
     counts
 }
@@ -106,6 +127,13 @@ fn numbers_are_recognized() {
     assert!(numbers.into_iter().all(is_number));
     let others = ["const NAMES: [&str; 1] = [\"a\"];", "let x: f64 = 3.0;", "const D: Kind = of(1);"];
     assert!(!others.into_iter().any(is_number));
+}
+
+#[test]
+fn imports_and_arguments_of_commands_are_left_out() {
+    let text = "use a::{\n    b,\n};\nmod c;\n#[derive(Debug, clap::Args)]\npub struct Args {\n    d: u8,\n}\npub fn run() {\n    e();\n}\n";
+    assert_eq!(own_lines(&lines(text)), 3);
+    assert_eq!(own_lines(&lines("#[derive(Debug)]\nstruct F {\n    g: u8,\n}\n")), 4);
 }
 
 #[test]
