@@ -4,8 +4,9 @@ use crate::attend::whole;
 use crate::errors::{choice, value};
 use crate::readings::shown;
 use crate::subject::Subject;
+use lnn::lagrangian::EulerLagrange;
 use lnn::pipeline::Event;
-use lnn::relativity::{Camera, Chart, NamedMetric, Observer, ShadowSummary, Tracing, View, time_moves_alone};
+use lnn::relativity::{Camera, Chart, Observer, Scene, Tracing};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -78,17 +79,17 @@ pub fn shadow<'py>(
         )));
     }
     let camera = choices.camera(choices.chart(&last.columns[..last.columns.len() / 2])?)?;
-    let mut tracing = Tracing { tolerance: choices.tolerance, threads: choices.threads, ..Tracing::of(&camera) };
-    let usual = if learned.is_none() { camera.sky_of_exact() } else { camera.sky_of_learned() };
-    tracing.far = choices.far.unwrap_or(usual);
+    let tracing = Tracing { tolerance: choices.tolerance, threads: choices.threads, ..Tracing::of(&camera) };
     let pixels = camera.width.saturating_mul(camera.height);
     let most = Camera::MOST_PIXELS;
     if !(1..=most).contains(&pixels) {
         return Err(value(format_args!("width, height: expected 1 to {most} pixels together, found {pixels}")));
     }
     let unit = exact.or(learned).and_then(Subject::time_unit);
-    let metrics: Vec<NamedMetric<'_>> = subjects.iter().map(|(name, subject)| (*name, subject.moving())).collect();
-    let (total, done) = (pixels * metrics.len(), AtomicUsize::new(0));
+    let metrics: Vec<(&str, Box<dyn EulerLagrange<f64> + '_>)> =
+        subjects.iter().map(|(name, subject)| (*name, Box::new(subject.moving()) as _)).collect();
+    let scene = Scene::new(metrics, &[], camera, tracing, choices.far).map_err(value)?;
+    let (total, done) = (scene.rays(), AtomicUsize::new(0));
     let (json, image) = whole(py, progress.as_ref(), |watch| {
         let advance = |rays: usize| {
             let done = done.fetch_add(rays, Ordering::Relaxed) + rays;
@@ -96,13 +97,9 @@ pub fn shadow<'py>(
                 events(Event::Step { done, total });
             }
         };
-        let looking = (&camera, &tracing, choices.edges);
-        let views = View::of(&metrics, looking, &watch.interrupt, &|_| (), &advance).map_err(value)?;
-        let free = metrics.iter().any(|(_, model)| time_moves_alone(*model, camera.chart, camera.distance));
-        let about = (last.name(), unit.as_deref());
-        let summary =
-            ShadowSummary::of(about, (&camera, &tracing), &views, free && learned.is_some()).map_err(value)?;
-        Ok::<_, PyErr>((shown(&summary, &summary.findings(None))?, camera.picture(&views).map_err(value)?))
+        let views = scene.views(choices.edges, &watch.interrupt, &|_| (), &advance).map_err(value)?;
+        let summary = scene.summary((last.name(), unit.as_deref()), &views).map_err(value)?;
+        Ok::<_, PyErr>((shown(&summary, &summary.findings(None))?, scene.picture(&views).map_err(value)?))
     })??;
     Ok((json, PyBytes::new(py, image.pixels.as_flattened()), (image.height, image.width)))
 }

@@ -31,8 +31,6 @@ pub const MOST_METRIC_COORDINATES: usize = 64;
 pub const MOST_PIECES: usize = 1_000_000;
 /// Largest number of directions in which the edge of a shadow is found; each requires a bisection of rays.
 pub const MOST_EDGES: f64 = 4096.0;
-/// Approximate memory per pixel and metric while a picture is computed: two copies of its ray, and its colours.
-pub const PIXEL_BYTES: u64 = 112;
 /// Largest number of runs in a sweep; each is a training.
 pub const MOST_RUNS: usize = 10_000;
 /// Largest number of unknown coefficients of quadratic quantities for which states are drawn: the search grows with their cube.

@@ -146,6 +146,15 @@ impl Default for Chart {
 }
 
 impl Chart {
+    /// Names of the spatial coordinates of a metric unless others are chosen: `x`, `y`, `z` if they are among the coordinates,
+    /// otherwise the three beside the time in their order.
+    pub fn usual_space(coordinates: &[String], time: &str) -> Vec<String> {
+        let cartesian = ["x", "y", "z"].map(String::from);
+        let others: Vec<String> = coordinates.iter().filter(|name| *name != time).cloned().collect();
+        let is_cartesian = others.len() != 3 || cartesian.iter().all(|name| coordinates.contains(name));
+        if is_cartesian { cartesian.to_vec() } else { others }
+    }
+
     /// Refuses a model of another number of coordinates, and indices that do not name each of them once.
     ///
     /// # Errors

@@ -6,7 +6,8 @@
 //! A [`Camera`] stands at a point of a metric whose space has Cartesian coordinates around a centre. Through every pixel a null geodesic is
 //! followed backwards in time, by the accelerations of the model alone, until it reaches a great distance, where its direction gives a
 //! point of the sky, or piles up at a horizon, in which case the pixel belongs to the shadow. [`Shadow::of()`] does so for a picture,
-//! [`Outline::of`] finds the edge of the shadow by bisection, with the impact parameters of its rays, and [`Sky`] gives the colours.
+//! [`Outline::of`] finds the edge of the shadow by bisection, with the impact parameters of its rays, and [`Sky`] gives the colours. A
+//! [`Scene`] does all of it for an exact metric, a learned one, or both side by side.
 //!
 //! ```
 //! use lnn::lagrangian::SystemInstance;
@@ -29,6 +30,7 @@ mod rays;
 #[cfg(feature = "training")]
 mod readings;
 mod report;
+mod scene;
 mod shadow;
 mod sky;
 mod thresholds;
@@ -40,18 +42,14 @@ pub use rays::{Ray, RayOutcome, Tracing};
 #[cfg(feature = "training")]
 pub use readings::{LearnedHole, Reading};
 pub use report::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary};
+pub use scene::Scene;
 pub use shadow::{Edge, Outline, Shadow};
 pub use sky::{Image, Sky};
 pub use two_sided::TwoSided;
 
 // For the packages of this repository.
 #[doc(hidden)]
-pub use {
-    coordinates::{depends_on_time, time_moves_alone},
-    orbits::orbits,
-    sky::difference_image,
-    thresholds::TOLERANCES,
-};
+pub use {coordinates::depends_on_time, orbits::orbits, sky::difference_image, thresholds::TOLERANCES};
 
 use crate::geometry::GeometryError;
 use crate::lagrangian::MechanicsError;

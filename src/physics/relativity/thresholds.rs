@@ -87,6 +87,8 @@ pub(super) const STEP_SAFETY: f64 = 0.9;
 pub(super) const STEP_CHANGES: (f64, f64) = (0.2, 5.0);
 /// Distance beyond the sky to which a step may lead, over that of the sky.
 pub(super) const BEYOND_SKY: f64 = 1e-3;
+/// Approximate memory per pixel and metric while a picture is computed: two copies of its ray, and its colours.
+pub(super) const PIXEL_BYTES: u64 = 112;
 /// Halvings of the angle from 0 to pi that find the edge of a shadow.
 pub(super) const EDGE_HALVINGS: usize = 30;
 /// Tolerance of a step for the edge, over that for a picture.

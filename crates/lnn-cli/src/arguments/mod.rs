@@ -8,6 +8,7 @@ pub mod input;
 pub mod integration;
 pub mod layers;
 pub mod learned;
+pub mod metrics;
 pub mod motion_source;
 pub mod number;
 pub mod plain_name;

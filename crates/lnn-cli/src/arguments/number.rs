@@ -1,6 +1,7 @@
 //! Parses values of the command line: numbers within ranges, and choices by name.
 
 use crate::CliError;
+use crate::thresholds::MOST_EDGES;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lnn::lagrangian::quantity;
 use lnn::names::unknown;
@@ -121,6 +122,12 @@ pub fn range(text: &str, separator: &str) -> Option<(f64, f64)> {
     (low <= high && (high - low).is_finite()).then_some((low, high))
 }
 
+/// A number of directions all around, a multiple of four.
+pub fn directions(text: &str) -> Result<usize, String> {
+    let number = weight(text).ok().filter(|x| x % 4.0 == 0.0 && *x <= MOST_EDGES);
+    number.map(|x| x as usize).ok_or_else(|| format!("expected a multiple of four from 0 to {MOST_EDGES}"))
+}
+
 /// A whole number above 0.
 pub fn count(text: &str) -> Result<usize, String> {
     text.trim().parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above 0".to_string())
@@ -216,6 +223,12 @@ pub fn threads(asked: Option<usize>) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn directions_are_counted_by_quarters() {
+        assert_eq!((directions("0"), directions(" 64 ")), (Ok(0), Ok(64)));
+        assert!(["3", "-4", "4100", "x", ""].iter().all(|bad| directions(bad).is_err()));
+    }
 
     #[test]
     fn ranges_are_kept() {

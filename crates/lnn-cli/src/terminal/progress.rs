@@ -37,6 +37,11 @@ impl Progress {
         self.bar.set_position(done);
     }
 
+    /// Adds finished steps, from any thread.
+    pub fn add(&self, done: usize) {
+        self.bar.inc(done as u64);
+    }
+
     /// Shows a short description of the current work.
     pub fn say(&self, text: &str) {
         self.bar.set_message(text.to_string());
