@@ -88,16 +88,11 @@ pub fn identify(py: Python<'_>, motion: Motion, system: &Subject, choices: &str)
     whole(py, None, |watch| {
         options.cancellation = watch.cancellation();
         let mut loaded = source.read()?;
-        if options.errors.is_empty() {
-            options.errors = std::mem::take(&mut loaded.errors);
-        }
-        if options.inputs.is_empty() {
-            options.inputs = std::mem::take(&mut loaded.inputs);
-        }
-        options.missing = std::mem::take(&mut loaded.missing);
+        let options = options.of_recording(&loaded);
+        // Data in memory may have names of their own.
         let columns = instance.readings().iter().map(|reading| &reading.column);
-        if !instance.readings().is_empty() && columns.eq(&loaded.recording.coordinates) {
-            loaded.recording.coordinates = instance.measured().map(str::to_string).collect();
+        if columns.eq(&loaded.recording.coordinates) {
+            loaded = loaded.measured_by(&instance);
         }
         let found = identified(&instance, &loaded.recording, &options).map_err(value)?.with_rows_of(&loaded);
         shown(&found, &found.findings())

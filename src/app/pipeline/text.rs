@@ -1,7 +1,8 @@
-//! Parses configurations and systems, and finds the lines of keys.
+//! Parses configurations and systems, finds the lines of keys, and writes results as system files.
 
-use crate::lagrangian::{Description, System};
-use crate::pipeline::from_table;
+use crate::identification::Identified;
+use crate::lagrangian::{Description, System, SystemInstance};
+use crate::pipeline::{PipelineError, from_table};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use toml::de::{DeTable, DeValue};
@@ -18,6 +19,17 @@ pub fn parse_system(text: &str) -> Result<System, (usize, String)> {
     let placed = names.filter_map(|name| Some((name.clone(), *lines.get(&format!("constraints.{name}"))?))).collect();
     description.constraint_lines.0 = placed;
     description.system().map_err(|error| (line_of(&lines, &error.key).unwrap_or(1), error.to_string()))
+}
+
+impl Identified {
+    /// The system file with the identified constants; `None` if the system is one of the catalogue, which has no file.
+    ///
+    /// # Errors
+    /// [`PipelineError::Format`] for a description that TOML cannot hold.
+    pub fn system_file(&self, system: &SystemInstance<f64>) -> Result<Option<String>, PipelineError> {
+        let described = system.system.with_defaults(&self.parameters(system));
+        described.map(|description| toml::to_string(&description).map_err(PipelineError::format)).transpose()
+    }
 }
 
 /// Parses a configuration.

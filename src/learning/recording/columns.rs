@@ -1,7 +1,7 @@
 //! Meaning of the columns of recorded files.
 
-use crate::names::pluralize;
-use crate::names::{taken_column, unknown};
+use crate::lagrangian::SystemInstance;
+use crate::names::{pluralize, taken_column, unknown};
 use crate::recording::heading::is_same;
 use crate::recording::units::factor;
 use thiserror::Error;
@@ -56,6 +56,61 @@ pub fn formula_in(text: &str) -> Option<&str> {
 }
 
 impl Columns {
+    /// Completes the columns for a recording of a system. Columns of the coordinates are by default those with their names, and angles
+    /// are those of the system; with a table `[measured]` in its file, the columns are those of the measured quantities. Inputs have
+    /// the names of the system's inputs. Trajectories stay [whole](Self::whole).
+    ///
+    /// # Errors
+    /// [`ColumnsError`]: another number of coordinates than that of the system, or columns that are given beside a table `[measured]`.
+    pub fn of_system(self, system: &SystemInstance<f64>) -> Result<Self, ColumnsError> {
+        let completed =
+            if system.readings().is_empty() { self.of_coordinates(system) } else { self.of_readings(system) };
+        Ok(Self { input: system.inputs().map(str::to_string).collect(), whole: true, ..completed? })
+    }
+
+    /// Completes the columns of the coordinates of a system.
+    fn of_coordinates(mut self, system: &SystemInstance<f64>) -> Result<Self, ColumnsError> {
+        let coordinates = system.system.coordinates(system.coordinates);
+        if self.coords.is_empty() {
+            self.coords = coordinates.iter().map(|coordinate| coordinate.name.to_string()).collect();
+        }
+        if self.coords.len() != coordinates.len() {
+            let (columns, found) = (pluralize(coordinates.len(), "column", "columns"), self.coords.len());
+            let name = &system.system.name;
+            let wrong = format!("coords: expected {columns}, as many as {name} has coordinates, found {found}");
+            return Err(ColumnsError(vec![wrong]));
+        }
+        if self.periodic.is_empty() {
+            let angles = self.coords.iter().zip(&coordinates).filter(|(_, coordinate)| coordinate.periodic);
+            self.periodic = angles.map(|(column, _)| column.clone()).collect();
+        }
+        Ok(self)
+    }
+
+    /// Takes the columns of the measured quantities of a system file.
+    fn of_readings(self, system: &SystemInstance<f64>) -> Result<Self, ColumnsError> {
+        let given = [
+            ("coords", &self.coords),
+            ("velocity", &self.velocity),
+            ("acceleration", &self.acceleration),
+            ("force", &self.force),
+            ("error", &self.error),
+            ("periodic", &self.periodic),
+        ];
+        if let Some((what, _)) = given.into_iter().find(|(_, columns)| !columns.is_empty()) {
+            let wrong = format!("{what}: the table [measured] of the system says what the columns are");
+            return Err(ColumnsError(vec![wrong]));
+        }
+        let readings = system.readings();
+        let angles = readings.iter().filter(|reading| reading.periodic);
+        Ok(Self {
+            coords: readings.iter().map(|reading| reading.column.clone()).collect(),
+            periodic: angles.map(|reading| reading.column.clone()).collect(),
+            error: readings.iter().filter_map(|reading| reading.error.clone()).collect(),
+            ..self
+        })
+    }
+
     /// Every column named, with its meaning.
     pub(crate) fn used(&self) -> impl Iterator<Item = (&'static str, &String)> {
         [
@@ -175,6 +230,19 @@ mod tests {
 
     fn list(names: &[&str]) -> Vec<String> {
         names.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_system_names_the_columns_that_are_left_open() {
+        let system = SystemInstance::<f64>::named("double-pendulum", &[]).unwrap();
+        let (angles, left) = (list(&["theta1", "theta2"]), Columns::default().of_system(&system).unwrap());
+        assert_eq!((left.coords, left.periodic, left.whole), (angles.clone(), angles, true));
+        let named = Columns { coords: list(&["a", "b"]), periodic: list(&["b"]), ..Columns::default() };
+        let named = named.of_system(&system).unwrap();
+        assert_eq!((named.coords, named.periodic), (list(&["a", "b"]), list(&["b"])));
+        let one = Columns { coords: list(&["a"]), ..Columns::default() };
+        let refused = one.of_system(&system).unwrap_err().to_string();
+        assert_eq!(refused, "coords: expected 2 columns, as many as double-pendulum has coordinates, found 1");
     }
 
     #[test]

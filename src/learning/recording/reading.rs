@@ -1,6 +1,7 @@
 //! The files and rows that recorded samples come from, and the rows that were left out.
 
 use super::thresholds::{INERTIAL_SHARE, LARGE_ACCELERATION_ERROR};
+use crate::lagrangian::SystemInstance;
 use crate::recording::read::FileFacts;
 use crate::recording::smooth::{Chosen, Smoothing, noise};
 use crate::recording::statistics::deviation;
@@ -123,6 +124,16 @@ impl LoadedRecording {
             given.or_else(|| header?.get(name)).and_then(|unit| si(unit)).unwrap_or_default()
         };
         self.columns.coords.iter().map(unit).collect()
+    }
+
+    /// Names the coordinates by the measured quantities of a system file, whose columns they are in the order of the quantities.
+    /// Nothing changes for a system without a table `[measured]`.
+    #[must_use]
+    pub fn measured_by(mut self, system: &SystemInstance<f64>) -> Self {
+        if !system.readings().is_empty() {
+            self.recording.coordinates = system.measured().map(str::to_string).collect();
+        }
+        self
     }
 }
 

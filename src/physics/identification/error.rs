@@ -180,3 +180,24 @@ pub enum IdentifyError {
     )]
     Lost,
 }
+
+impl IdentifyError {
+    /// The option with a value that cannot be used: a field of [`IdentifyOptions`](super::IdentifyOptions), such as `offsets`, or the key
+    /// `per` of a parameter of the system; `system` if its constants cannot be identified; `None` if the recording is at fault.
+    pub fn option(&self) -> Option<&'static str> {
+        match self {
+            Self::Constant { .. } => Some("constants"),
+            Self::Repeated { what, .. }
+            | Self::Sensor { what, .. }
+            | Self::SensorsBesideReadings { what }
+            | Self::Option { what, .. } => Some(what),
+            Self::Smooth(SmoothError::Option { what: "noise", .. }) => Some("noise"),
+            Self::Description(_)
+            | Self::System(_)
+            | Self::Unknown { .. }
+            | Self::MovesConstraints { .. }
+            | Self::Nothing { .. } => Some("system"),
+            _ => None,
+        }
+    }
+}

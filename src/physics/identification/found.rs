@@ -4,6 +4,7 @@ use super::by_trajectory::ByTrajectory;
 use super::course::Segment;
 use super::thresholds::NEAR_DECREMENT;
 use super::{Between, Verdict};
+use crate::lagrangian::SystemInstance;
 use crate::recording::{LoadedRecording, Recording};
 use serde::{Serialize, Serializer};
 
@@ -266,6 +267,17 @@ impl Identified {
             outlier.row = outlier.sample as u64 + 1;
         }
         self
+    }
+
+    /// Values of all parameters of the system, by symbol and in its order: the identified values of constants that were unknown,
+    /// otherwise those of the system.
+    pub fn parameters<'a>(&self, system: &'a SystemInstance<f64>) -> Vec<(&'a str, f64)> {
+        let value = |(symbol, given): (&'a str, f64)| {
+            let identified = self.constants.iter().find(|constant| constant.symbol == symbol);
+            (symbol, identified.map_or(given, |constant| constant.value))
+        };
+        let symbols = system.system.parameters.iter().map(|parameter| parameter.symbol.as_ref());
+        symbols.zip(system.parameters.iter().copied()).map(value).collect()
     }
 
     /// Sets the rows of outliers to those in the files of the recording.

@@ -2,7 +2,7 @@
 
 use super::Between;
 use crate::cancellation::Cancellation;
-use crate::recording::Targets;
+use crate::recording::{LoadedRecording, Targets};
 use serde::Deserialize;
 
 /// Options of [`identify`](super::identify). The defaults suit most recordings:
@@ -96,6 +96,18 @@ impl IdentifyOptions {
     /// Sets the standard deviations of the positions.
     pub fn errors(self, errors: Vec<Vec<f64>>) -> Self {
         Self { errors, ..self }
+    }
+
+    /// Takes what files hold beside the motion: the marks of missing readings, and standard deviations and inputs unless they are given.
+    pub fn of_recording(mut self, loaded: &LoadedRecording) -> Self {
+        self.missing.clone_from(&loaded.missing);
+        if self.errors.is_empty() {
+            self.errors.clone_from(&loaded.errors);
+        }
+        if self.inputs.is_empty() {
+            self.inputs.clone_from(&loaded.inputs);
+        }
+        self
     }
 
     /// Sets the marks of missing readings.

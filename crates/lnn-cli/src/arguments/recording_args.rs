@@ -4,9 +4,10 @@ use crate::CliError;
 use crate::arguments::number;
 use crate::arguments::spool::read_spooled;
 use crate::terminal::output;
+use lnn::lagrangian::SystemInstance;
 use lnn::names::pluralize;
 use lnn::recording::{ColumnGuess, Columns, DataError, Guess, LoadedRecording, Problem};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Recorded motion.
 #[derive(Clone, Debug, clap::Args)]
@@ -65,6 +66,11 @@ pub fn unit(text: &str) -> Result<(String, String), String> {
 }
 
 impl RecordingArgs {
+    /// The files.
+    pub fn inputs(&self) -> Vec<&Path> {
+        self.data.iter().map(PathBuf::as_path).collect()
+    }
+
     /// Meaning of the columns.
     pub fn meaning(&self) -> Columns {
         let Self { coords, velocity, acceleration, force, time, rate, trajectory, wide, periodic, .. } = self.clone();
@@ -81,6 +87,17 @@ impl RecordingArgs {
         let (reading, Guess { columns, table }) = self.load(false)?;
         note(&columns, &table);
         Ok((reading, columns))
+    }
+
+    /// Reads the files as a recording of a system, which names the columns that are not given; `error` are the columns of standard
+    /// deviations.
+    ///
+    /// # Errors
+    /// Those of [`read`], and a usage error for columns that do not match the system.
+    pub fn read_of(&self, system: &SystemInstance<f64>, error: &[String]) -> Result<LoadedRecording, CliError> {
+        let columns = Columns { error: error.to_vec(), ..self.meaning() };
+        let completed = columns.clone().of_system(system).map_err(|wrong| refused(&wrong.into(), &columns))?;
+        Ok(read(&self.data, &completed)?.measured_by(system))
     }
 
     /// Reads the files, and returns the roles of the columns; with `beside`, also the numbers in other columns.

@@ -2,18 +2,17 @@
 
 use crate::CliError;
 use crate::arguments::number::{choice, positive, seconds, thread_count, threads};
-use crate::arguments::recording_args::{RecordingArgs, read as read_files};
+use crate::arguments::recording_args::RecordingArgs;
 use crate::arguments::source::parameter;
 use crate::arguments::system_arg;
 use crate::directories::files::OutputFile;
 use crate::terminal::output;
-use crate::terminal::result_page::{self, PageArgs};
+use crate::terminal::result_page::PageArgs;
 use crate::terminal::watch::search;
 use lnn::identification::{Between, Identified, IdentifyError, IdentifyOptions, identify};
 use lnn::lagrangian::SystemInstance;
-use lnn::names::pluralize;
-use lnn::pipeline::{is_robot, parse_system, rewrite_robot};
-use lnn::recording::{Columns, LoadedRecording, Targets};
+use lnn::pipeline::{is_robot, rewrite_robot};
+use lnn::recording::Targets;
 use lnn::report::identification_figures;
 use std::path::{Path, PathBuf};
 
@@ -98,23 +97,27 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         let problem = "only a system that a file describes can be written; use the constants with --param";
         return Err(CliError::usage(format_args!("--out: {problem}")));
     }
-    let inputs: Vec<&Path> =
-        args.recording.data.iter().map(PathBuf::as_path).chain([Path::new(&args.system)]).collect();
-    let out = args.out.as_deref().map(|out| claim(args, out, &inputs)).transpose()?;
-    let page = args.page.claim(&inputs)?;
+    let mut inputs = args.recording.inputs();
+    inputs.push(Path::new(&args.system));
+    let files = args.page.files(args.out.as_deref(), &inputs, |out, inputs, overwrite| match rewritten(args) {
+        None => OutputFile::claim_system(out, inputs, overwrite),
+        Some(robot) => {
+            // Detects before the search what cannot be written after it.
+            system_arg::from_robot(robot, |text| rewrite_robot(text, &[]))?;
+            OutputFile::claim(out, inputs, overwrite)
+        }
+    })?;
     let instance =
         SystemInstance::<f64>::new(system, &args.param).map_err(|e| CliError::usage(format_args!("--param: {e}")))?;
     system_arg::note_impacts(&instance);
-    let reading = read(args, &instance)?;
+    let reading = args.recording.read_of(&instance, &args.error)?;
     let options = IdentifyOptions::new()
         .constants(&args.constants)
         .offsets(&args.offset)
         .gains(&args.gain)
         .delays(&args.delay)
         .noise(args.noise.clone())
-        .errors(reading.errors.clone())
-        .inputs(reading.inputs.clone())
-        .missing(reading.missing.clone())
+        .of_recording(&reading)
         .targets(args.targets)
         .between(args.between)
         .segment(args.segment)
@@ -124,131 +127,37 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         .cancellation(search()?);
     let found = identify(&instance, &reading.recording, &options).map_err(refused)?;
     drop(options);
-    if let Some(out) = &out {
-        write(args, out, &instance, &found)?;
+    match (&files.out, rewritten(args)) {
+        (Some(out), Some(robot)) => {
+            let values = found.parameters(&instance);
+            out.write(system_arg::from_robot(robot, |text| rewrite_robot(text, &values))?.as_bytes())?;
+        }
+        (Some(out), None) => {
+            if let Some(text) = found.system_file(&instance)? {
+                out.write_system(&text, CliError::data)?;
+            }
+        }
+        (None, _) => {}
     }
     let found = found.with_rows_of(&reading);
     let title = format!("Constants of {}", instance.system.name);
-    result_page::write(page, &title, &found.findings(), &identification_figures(&found, &reading.recording.periodic))?;
-    OutputFile::print(out, &output::shown(&found, args.json, Identified::findings)?)
+    files.write_page(&title, &found.findings(), &identification_figures(&found, &reading.recording.periodic))?;
+    files.print(&output::shown(&found, args.json, Identified::findings)?)
 }
 
-/// Reads the recording; its columns are named like the coordinates unless options name others.
-fn read(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
-    if !instance.readings().is_empty() {
-        return read_measured(args, instance);
-    }
-    let coordinates = instance.system.coordinates(instance.coordinates);
-    let mut recording = args.recording.clone();
-    if recording.coords.is_empty() {
-        recording.coords = coordinates.iter().map(|c| c.name.to_string()).collect();
-    }
-    if recording.coords.len() != coordinates.len() {
-        let (expected, found) = (coordinates.len(), recording.coords.len());
-        let columns = pluralize(expected, "column", "columns");
-        return Err(CliError::usage(format_args!(
-            "--coords: expected {columns}, as many as {} has coordinates, found {found}",
-            instance.system.name
-        )));
-    }
-    if recording.periodic.is_empty() {
-        let angles = recording.coords.iter().zip(&coordinates).filter(|(_, coordinate)| coordinate.periodic);
-        recording.periodic = angles.map(|(column, _)| column.clone()).collect();
-    }
-    let (error, input) = (args.error.clone(), instance.inputs().map(str::to_string).collect());
-    let columns = Columns { error, input, whole: true, ..recording.meaning() };
-    read_files(&recording.data, &columns)
-}
-
-/// Reads the recording of the quantities that the system file declares as measured; the columns have their names.
-fn read_measured(args: &Args, instance: &SystemInstance<f64>) -> Result<LoadedRecording, CliError> {
-    let mut recording = args.recording.clone();
-    let given = [
-        ("--coords", recording.coords.is_empty()),
-        ("--velocity", recording.velocity.is_empty()),
-        ("--acceleration", recording.acceleration.is_empty()),
-        ("--force", recording.force.is_empty()),
-        ("--error", args.error.is_empty()),
-        ("--periodic", recording.periodic.is_empty()),
-    ];
-    if let Some((option, _)) = given.iter().find(|(_, is_empty)| !is_empty) {
-        let problem = "the table [measured] of the system says what the columns are";
-        return Err(CliError::usage(format_args!("{option}: {problem}")));
-    }
-    let readings = instance.readings();
-    let columns =
-        |angles: bool| readings.iter().filter(move |own| own.periodic || !angles).map(|own| own.column.clone());
-    (recording.coords, recording.periodic) = (columns(false).collect(), columns(true).collect());
-    let error = readings.iter().filter_map(|own| own.error.clone()).collect();
-    let input = instance.inputs().map(str::to_string).collect();
-    let columns = Columns { error, input, whole: true, ..recording.meaning() };
-    let mut reading = read_files(&recording.data, &columns)?;
-    reading.recording.coordinates = instance.measured().map(str::to_string).collect();
-    Ok(reading)
+/// The robot's file that is written with other constants, if the system is a robot and `--out` names a robot's file.
+fn rewritten(args: &Args) -> Option<&Path> {
+    args.out.as_deref().filter(|out| is_robot(out)).map(|_| Path::new(&args.system)).filter(|system| is_robot(system))
 }
 
 /// Distinguishes usage errors, caused by options, from data errors.
 fn refused(error: IdentifyError) -> CliError {
-    match &error {
-        IdentifyError::Constant { .. } | IdentifyError::Repeated { what: "constants", .. } => {
-            CliError::usage(format_args!("--{error}"))
+    match (&error, error.option()) {
+        (IdentifyError::Cancelled(_), _) => CliError::nothing_written(),
+        (_, Some(name @ ("offsets" | "gains" | "delays"))) => {
+            CliError::option(name.trim_end_matches('s'), name, &error)
         }
-        IdentifyError::Sensor { what, .. }
-        | IdentifyError::SensorsBesideReadings { what }
-        | IdentifyError::Repeated { what, .. } => {
-            // The messages use plural names, but options are singular.
-            let text = error.to_string();
-            CliError::usage(format_args!("--{}{}", what.trim_end_matches('s'), &text[what.len()..]))
-        }
-        IdentifyError::Smooth(problem) if problem.to_string().starts_with("noise") => {
-            CliError::usage(format_args!("--{error}"))
-        }
-        IdentifyError::Cancelled(_) => CliError::nothing_written(),
-        IdentifyError::Option { .. } => CliError::usage(format_args!("--{error}")),
-        IdentifyError::Description(_)
-        | IdentifyError::System(_)
-        | IdentifyError::Unknown { .. }
-        | IdentifyError::MovesConstraints { .. }
-        | IdentifyError::Nothing { .. } => CliError::usage(format_args!("--system: {error}")),
-        _ => CliError::data(error),
+        (_, Some(name)) => CliError::option(name, name, &error),
+        (_, None) => CliError::data(&error),
     }
-}
-
-/// `true` if the result goes into a robot file.
-fn is_robot_written(args: &Args) -> bool {
-    args.out.as_deref().is_some_and(is_robot)
-}
-
-/// The file of the result: a system file, or a robot's file if the system is one.
-fn claim<'a>(args: &Args, out: &'a Path, inputs: &[&Path]) -> Result<OutputFile<'a>, CliError> {
-    match is_robot_written(args) && is_robot(Path::new(&args.system)) {
-        true => {
-            // Detects before the search what cannot be written after it.
-            system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &[]))?;
-            OutputFile::claim(out, inputs, args.page.overwrite)
-        }
-        false => OutputFile::claim_system(out, inputs, args.page.overwrite),
-    }
-}
-
-/// Writes the description, or the robot file, with the identified values.
-fn write(
-    args: &Args,
-    out: &OutputFile<'_>,
-    instance: &SystemInstance<f64>,
-    found: &Identified,
-) -> Result<(), CliError> {
-    let given = instance.system.parameters.iter().zip(&instance.parameters);
-    let mut values: Vec<(&str, f64)> = given.map(|(parameter, value)| (parameter.symbol.as_ref(), *value)).collect();
-    for constant in &found.constants {
-        values.iter_mut().filter(|(name, _)| *name == constant.symbol).for_each(|(_, x)| *x = constant.value);
-    }
-    if is_robot_written(args) {
-        let written = system_arg::from_robot(Path::new(&args.system), |text| rewrite_robot(text, &values))?;
-        return out.write(written.as_bytes());
-    }
-    let Some(description) = instance.system.with_defaults(&values) else { return Ok(()) };
-    let text = toml::to_string(&description).map_err(CliError::data)?;
-    parse_system(&text).map_err(|(_, problem)| CliError::data(format_args!("--out: no system file: {problem}")))?;
-    out.write(text.as_bytes())
 }

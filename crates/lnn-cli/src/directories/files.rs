@@ -3,6 +3,7 @@
 use crate::CliError;
 use crate::arguments::input::is_standard;
 use crate::terminal::output;
+use lnn::pipeline::parse_system;
 use lnn::storage::{check_target, write_atomically, write_new};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -92,6 +93,15 @@ impl<'a> OutputFile<'a> {
             }
             _ => cannot_write(self.path, error),
         })
+    }
+
+    /// Writes the text of a system file, if it describes a system; otherwise `refused` makes the error.
+    ///
+    /// # Errors
+    /// Those of [`write`](Self::write), and the one that `refused` makes.
+    pub fn write_system(&self, text: &str, refused: impl FnOnce(String) -> CliError) -> Result<(), CliError> {
+        parse_system(text).map_err(|(_, problem)| refused(format!("--out: no system file: {problem}")))?;
+        self.write(text.as_bytes())
     }
 
     /// Prints the command's remarks: on standard error if the file itself goes to standard output.

@@ -35,6 +35,15 @@ impl CliError {
     pub fn usage(message: impl fmt::Display) -> Self {
         Self { kind: Kind::Usage, message: one_line(&message.to_string()) }
     }
+    /// Creates an error for the value of an option, given without its dashes. The problem may begin with the name of the value in the
+    /// library, such as `offsets:`, which the option replaces.
+    pub fn option(option: &str, name: &str, problem: impl fmt::Display) -> Self {
+        let text = problem.to_string();
+        match text.strip_prefix(name).filter(|rest| rest.starts_with(':')) {
+            Some(rest) => Self::usage(format_args!("--{option}{rest}")),
+            None => Self::usage(format_args!("--{option}: {text}")),
+        }
+    }
     /// Several mistakes in arguments or configuration, one line each.
     ///
     /// # Errors
@@ -130,6 +139,13 @@ mod tests {
         let two = CliError::all_usage(["a\nb", "c"].map(String::from)).unwrap_err();
         assert_eq!(format!("error: {two}"), "error: a b\nerror: c");
         assert_eq!(CliError::all_usage([]), Ok(()));
+    }
+
+    #[test]
+    fn options_replace_the_names_of_their_values() {
+        let refused = |problem: &str| CliError::option("offset", "offsets", problem).to_string();
+        assert_eq!(refused("offsets: q is given twice"), "--offset: q is given twice");
+        assert_eq!(refused("offsets of q"), "--offset: offsets of q");
     }
 
     #[test]
