@@ -70,10 +70,6 @@ pub fn formula(py: Python<'_>, motion: Motion, choices: &str) -> PyResult<String
     whole(py, None, |watch| {
         options.cancellation = watch.cancellation();
         let recording = source.read()?.recording;
-        let n = recording.coordinates.len();
-        if let Some(noise) = options.noise.as_ref().filter(|noise| noise.len() != n) {
-            return Err(value(format_args!("noise: expected {n} numbers, found {}", noise.len())));
-        }
         formula_shown(&FoundFormula::of_motion(&recording, &options).map_err(value)?, &name)
     })?
 }

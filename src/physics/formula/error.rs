@@ -1,6 +1,7 @@
 //! Errors of the search for a formula.
 
 use crate::cancellation::Cancelled;
+use crate::recording::LoadedRecording;
 use crate::recording::smooth::SmoothError;
 use thiserror::Error;
 
@@ -34,6 +35,14 @@ pub enum FormulaError {
         text: String,
         /// Description of the error.
         problem: String,
+    },
+    /// Another number of standard deviations of the noise than of coordinates.
+    #[error("noise: expected {expected} numbers, found {found}")]
+    Noise {
+        /// Number of coordinates.
+        expected: usize,
+        /// Number of standard deviations.
+        found: usize,
     },
     /// A term that gives the scale but is not in the formula.
     #[error("scale: {term:?} is no term of the formula; its terms are {known}")]
@@ -133,4 +142,26 @@ pub enum FormulaError {
         /// All states.
         states: usize,
     },
+}
+
+impl FormulaError {
+    /// The field of [`FormulaOptions`](super::FormulaOptions) with a value that cannot be used, such as `scale`; `None` if the motion
+    /// or the model is at fault.
+    pub fn option(&self) -> Option<&'static str> {
+        match self {
+            Self::Terms { .. } => Some("families"),
+            Self::Function { .. } => Some("functions"),
+            Self::Noise { .. } => Some("noise"),
+            Self::Scale { .. } => Some("scale"),
+            _ => None,
+        }
+    }
+
+    /// The row of the first sample that does not belong to the motion, in the files of the recording; `None` for other errors.
+    pub fn row(&self, loaded: &LoadedRecording) -> Option<u64> {
+        match self {
+            Self::Wild { track, sample, .. } => Some(loaded.rows[*track].row(*sample)),
+            _ => None,
+        }
+    }
 }

@@ -21,9 +21,13 @@ impl FoundFormula {
     ///
     /// # Errors
     /// [`FormulaError`] for motion that is too short, cannot be smoothed or does not determine a law, for example because a coordinate stands still;
-    /// for a library that is too large, and for invalid functions and terms. Motion that the library cannot fit is not an error: the verdict reports
+    /// for a library that is too large, and for an invalid noise, function or term. Motion that the library cannot fit is not an error: the verdict reports
     /// it.
     pub fn of_motion(recording: &Recording, options: &FormulaOptions) -> Result<Self, FormulaError> {
+        let expected = recording.n();
+        if let Some(found) = options.noise.as_ref().map(Vec::len).filter(|found| *found != expected) {
+            return Err(FormulaError::Noise { expected, found });
+        }
         let rungs = options.families.map_or_else(|| rungs(&recording.periodic), |families| vec![families]);
         let friction = if options.friction { Friction::Constant } else { Friction::None };
         let first = Extent { families: rungs[0], gyroscopic: options.gyroscopic, friction, drive: None };

@@ -81,6 +81,12 @@ impl FoundFormula {
         }
     }
 
+    /// The equation of the Lagrangian in LaTeX, and below it that of the dissipation function if one was searched.
+    pub fn latex_equations(&self) -> String {
+        let dissipation = if self.friction { format!("D = {}\n", self.latex(true)) } else { String::new() };
+        format!("L = {}\n{dissipation}", self.latex(false))
+    }
+
     fn sum(&self, dissipation: bool, write: impl Fn(&FoundTerm) -> (String, String), product: &str) -> String {
         let mut text = String::new();
         for term in self.terms.iter().filter(|t| t.dissipation == dissipation) {

@@ -122,6 +122,14 @@ pub fn range(text: &str, separator: &str) -> Option<(f64, f64)> {
     (low <= high && (high - low).is_finite()).then_some((low, high))
 }
 
+/// A coefficient of a term, other than 0: `TERM=VALUE`.
+pub fn coefficient(text: &str) -> Result<(String, f64), String> {
+    let wrong = || "expected TERM=VALUE, such as x_dot^2=0.5".to_string();
+    let (term, value) = text.rsplit_once('=').ok_or_else(wrong)?;
+    let value = finite(value).ok().filter(|value| *value != 0.0).ok_or_else(wrong)?;
+    Ok((term.trim().to_string(), value))
+}
+
 /// A number of directions all around, a multiple of four.
 pub fn directions(text: &str) -> Result<usize, String> {
     let number = weight(text).ok().filter(|x| x % 4.0 == 0.0 && *x <= MOST_EDGES);

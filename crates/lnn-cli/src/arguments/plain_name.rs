@@ -1,4 +1,4 @@
-//! Names that may be used as directory names.
+//! Names of directories and of systems.
 
 use crate::thresholds::LONGEST_NAME;
 
@@ -14,6 +14,19 @@ pub fn plain_name(text: &str) -> Result<String, String> {
         Ok(text.to_string())
     } else {
         Err("expected a plain name: letters, digits, - _ . and spaces within, a letter or digit first".to_string())
+    }
+}
+
+/// The name of a system in its file: 1 to 64 letters, digits, `-` and `_`.
+///
+/// # Errors
+/// A description of such names.
+pub fn system_name(text: &str) -> Result<String, String> {
+    let known = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+    if !text.is_empty() && text.len() <= 64 && text.chars().all(known) {
+        Ok(text.to_string())
+    } else {
+        Err("expected 1 to 64 letters, digits, - and _".to_string())
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::CliError;
 use crate::arguments::number;
 use crate::arguments::spool::read_spooled;
+use crate::directories::files::ends_in;
 use crate::terminal::output;
 use lnn::lagrangian::SystemInstance;
 use lnn::names::pluralize;
@@ -65,10 +66,23 @@ pub fn unit(text: &str) -> Result<(String, String), String> {
     lnn::pipeline::unit(text).ok_or_else(|| "expected COLUMN=UNIT".to_string())
 }
 
+/// Describes the argument DATA of a command that accepts something else instead; the options of columns apply only to data.
+pub fn data_or(value_name: &'static str, help: &'static str) -> impl Fn(clap::Arg) -> clap::Arg {
+    move |argument| if argument.get_id() == "data" { argument.value_name(value_name).help(help) } else { argument }
+}
+
 impl RecordingArgs {
     /// The files.
     pub fn inputs(&self) -> Vec<&Path> {
         self.data.iter().map(PathBuf::as_path).collect()
+    }
+
+    /// The model, a file or the directory of a run, if a single one is given instead of data.
+    pub fn model(&self) -> Option<&Path> {
+        match self.data.as_slice() {
+            [path] if path.is_dir() || ends_in(path, &["safetensors"]) => Some(path),
+            _ => None,
+        }
     }
 
     /// Meaning of the columns.
