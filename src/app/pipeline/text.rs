@@ -1,5 +1,6 @@
 //! Parses configurations and systems, finds the lines of keys, and writes results as system files.
 
+use crate::constraints::FoundConstraints;
 use crate::identification::Identified;
 use crate::lagrangian::{Description, System, SystemInstance};
 use crate::pipeline::{PipelineError, from_table};
@@ -19,6 +20,34 @@ pub fn parse_system(text: &str) -> Result<System, (usize, String)> {
     let placed = names.filter_map(|name| Some((name.clone(), *lines.get(&format!("constraints.{name}"))?))).collect();
     description.constraint_lines.0 = placed;
     description.system().map_err(|error| (line_of(&lines, &error.key).unwrap_or(1), error.to_string()))
+}
+
+/// Parses the formulas of the table `[constraints]` of a system file, by name.
+///
+/// # Errors
+/// Line, from 1, if it is known, and what is wrong there.
+pub fn constraints(text: &str) -> Result<BTreeMap<String, String>, (Option<usize>, String)> {
+    let wrong = |problem: &str| (None, problem.to_string());
+    let mut table = table(text).map_err(|(line, problem)| (Some(line), problem))?;
+    let found = table.remove("constraints").ok_or_else(|| wrong("expected a table [constraints]"))?;
+    let formulas: BTreeMap<String, String> =
+        found.try_into().map_err(|_| wrong("constraints: expected formulas by name"))?;
+    if formulas.is_empty() { Err(wrong("expected formulas in the table [constraints]")) } else { Ok(formulas) }
+}
+
+impl FoundConstraints {
+    /// The table `[constraints]` of a system file with the constraints of the system; `None` if there are none.
+    ///
+    /// # Errors
+    /// [`PipelineError::Format`] for formulas that TOML cannot hold.
+    pub fn system_table(&self) -> Result<Option<String>, PipelineError> {
+        let formulas = self.formulas();
+        if formulas.is_empty() {
+            return Ok(None);
+        }
+        let table = BTreeMap::from([("constraints", formulas)]);
+        toml::to_string(&table).map(Some).map_err(PipelineError::format)
+    }
 }
 
 impl Identified {
@@ -107,6 +136,16 @@ fn note_lines(table: &DeTable<'_>, before: &str, line: &dyn Fn(usize) -> usize, 
 mod tests {
     use super::*;
     use crate::configuration::Config;
+
+    #[test]
+    fn constraints_are_read_from_their_table() {
+        let refused = |text: &str| constraints(text).unwrap_err();
+        assert_eq!(constraints("[constraints]\nrod = \"x^2 + y^2 - 1\"\n").unwrap()["rod"], "x^2 + y^2 - 1");
+        assert_eq!(refused("name = \"x\"\n"), (None, "expected a table [constraints]".to_string()));
+        assert_eq!(refused("[constraints]\n").1, "expected formulas in the table [constraints]");
+        assert_eq!(refused("[constraints]\nrod = 1\n").1, "constraints: expected formulas by name");
+        assert!(refused("[constraints\n").0.is_some());
+    }
 
     #[test]
     fn refusals_are_placed() {

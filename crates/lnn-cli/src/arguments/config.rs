@@ -3,7 +3,7 @@
 use crate::CliError;
 use crate::arguments::input;
 use crate::thresholds::MAX_CONFIG_BYTES;
-pub use lnn::pipeline::text::{Lines, line_of, lines, parse, table};
+pub use lnn::pipeline::text::{Lines, constraints, line_of, lines, parse, table};
 use std::path::Path;
 
 /// The name of a file in messages, and its text; standard input if it is `-`.

@@ -1,13 +1,13 @@
 //! Arguments of `lnn fit` and the resulting configuration.
 
 use crate::CliError;
+use crate::arguments::constraints::formulas;
 use crate::arguments::flags::Flags;
 use crate::arguments::input::is_standard;
 use crate::arguments::layers::{Entry, Layers, Mistake};
 use crate::arguments::plain_name::plain_name;
 use crate::arguments::recording_args::RecordingArgs;
 use crate::arguments::run_args::{RunArgs, add_implied, fill_periods, structure};
-use crate::commands::constraints::formulas;
 use crate::directories::resume::{SavedText, parse, require_same};
 use lnn::configuration::{Config, Data, Regularizer};
 use lnn::network::Structure;

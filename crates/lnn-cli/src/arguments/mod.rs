@@ -1,6 +1,7 @@
 //! Arguments that several commands share, and the files they name.
 
 pub mod config;
+pub mod constraints;
 pub mod fit_config;
 pub mod flags;
 pub mod forces;

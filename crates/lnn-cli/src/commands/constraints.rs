@@ -1,29 +1,29 @@
 //! `lnn constraints`: constraints of recorded motion, or constraints and degenerate directions of a Lagrangian.
 
 use crate::CliError;
-use crate::arguments::config;
+pub use crate::arguments::constraints::constrained;
 use crate::arguments::number::whole;
 use crate::arguments::probe::Probe;
-use crate::arguments::recording_args::RecordingArgs;
+use crate::arguments::recording_args::{RecordingArgs, data_or};
 use crate::directories::files::{OutputFile, ends_in};
 use crate::terminal::output;
-use crate::terminal::result_page::{self, PageArgs};
+use crate::terminal::result_page::PageArgs;
 use crate::terminal::watch::search;
 use lnn::constraints::{
     ConstraintSearch, ConstraintSearchError, EXAMINED_STATES, ExaminedLagrangian, FoundConstraints, MotionSamples,
     examine,
 };
-use lnn::lagrangian::{EulerLagrange, FormulaConstraints};
 use lnn::recording::SmoothOptions;
 use lnn::report::found_constraint_figures;
-use lnn::scalar::Scalar;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
-#[command(mut_args(optional))]
+#[command(mut_args(data_or(
+    "DATA|MODEL|SYSTEM",
+    "Files of recorded motion, with --coords as for lnn check; or, without --coords, one trained model or system (name or file), \
+     to list its constraints and degenerate directions",
+)))]
 pub struct Args {
     #[command(flatten)]
     recording: RecordingArgs,
@@ -43,27 +43,9 @@ pub struct Args {
     json: bool,
 }
 
-/// Column options apply only to data, not to a Lagrangian.
-fn optional(argument: clap::Arg) -> clap::Arg {
-    match argument.get_id().as_str() {
-        "data" => argument.value_name("DATA|MODEL|SYSTEM").help(
-            "Files of recorded motion, with --coords as for lnn check; or, without --coords, one trained model or system (name or file), \
-             to list its constraints and degenerate directions",
-        ),
-        _ => argument,
-    }
-}
-
 /// `true` for a file that is neither a model nor a system.
 fn is_data(path: &Path) -> bool {
     path.is_file() && !ends_in(path, &["toml", "safetensors"])
-}
-
-/// The table of constraints in a file.
-#[derive(Serialize, Deserialize)]
-struct Table {
-    #[serde(default)]
-    constraints: BTreeMap<String, String>,
 }
 
 /// Finds constraints and prints them.
@@ -76,9 +58,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     {
         return examined(&one.to_string_lossy(), args);
     }
-    let inputs: Vec<&Path> = args.recording.data.iter().map(PathBuf::as_path).collect();
-    let out = args.out.as_deref().map(|out| OutputFile::claim(out, &inputs, args.page.overwrite)).transpose()?;
-    let page = args.page.claim(&inputs)?;
+    let files = args.page.files(args.out.as_deref(), &args.recording.inputs(), OutputFile::claim)?;
     let recording = args.recording.read()?.0.recording;
     let samples = MotionSamples::of(&recording, &SmoothOptions::default()).map_err(CliError::data)?.watched(&search()?);
     let wanted = ConstraintSearch { degree: args.degree, velocity_degree: args.velocity_degree };
@@ -86,26 +66,13 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         ConstraintSearchError::Cancelled(_) => CliError::nothing_written(),
         error => CliError::data(error),
     })?;
-    if let Some(out) = &out {
-        write_table(out, &found)?;
+    if let Some(out) = &files.out {
+        let nothing = "--out: no constraint was found within the noise: there is nothing to write";
+        out.write(found.system_table()?.ok_or_else(|| CliError::data(nothing))?.as_bytes())?;
     }
-    result_page::write(
-        page,
-        "Constraints of recorded motion",
-        &found.findings(),
-        &found_constraint_figures(&found, &samples),
-    )?;
-    OutputFile::print(out, &output::shown(&found, args.json, FoundConstraints::findings)?)
-}
-
-/// Writes the constraints of the system as the table that a system file takes.
-fn write_table(out: &OutputFile<'_>, found: &FoundConstraints) -> Result<(), CliError> {
-    let constraints = found.formulas();
-    if constraints.is_empty() {
-        return Err(CliError::data("--out: no constraint was found within the noise: there is nothing to write"));
-    }
-    let text = toml::to_string(&Table { constraints }).map_err(CliError::data)?;
-    out.write(text.as_bytes())
+    let figures = found_constraint_figures(&found, &samples);
+    files.write_page("Constraints of recorded motion", &found.findings(), &figures)?;
+    files.print(&output::shown(&found, args.json, FoundConstraints::findings)?)
 }
 
 /// Analyses a system or a model, and prints its constraints and degenerate directions.
@@ -121,52 +88,7 @@ fn examined(name: &str, args: &Args) -> Result<(), CliError> {
     if examined.states == 0 {
         return Err(CliError::data(format_args!("{}: the mass matrix is not finite at any sampled state", probe.name)));
     }
-    let page = args.page.claim(&[Path::new(name)])?;
-    result_page::write(page, "Constraints of a Lagrangian", &examined.findings(), &[])?;
-    output::print(&output::shown(&examined, args.json, ExaminedLagrangian::findings)?)
-}
-
-/// The table [constraints] of a file.
-///
-/// # Errors
-/// A usage error for a file without such a table, a data error for one that cannot be read.
-pub fn formulas(file: &Path) -> Result<BTreeMap<String, String>, CliError> {
-    let (name, text) = config::read_text(file)?;
-    let wrong = |problem: &str| CliError::usage(format_args!("{name}: {problem}"));
-    let table: toml::Table =
-        config::table(&text).map_err(|(line, problem)| CliError::usage(format_args!("{name}:{line}: {problem}")))?;
-    let Some(found) = table.get("constraints").cloned() else { return Err(wrong("expected a table [constraints]")) };
-    let formulas: BTreeMap<String, String> =
-        found.try_into().map_err(|_| wrong("constraints: expected formulas by name"))?;
-    if formulas.is_empty() { Err(wrong("expected formulas in the table [constraints]")) } else { Ok(formulas) }
-}
-
-/// Line numbers of the constraints of a file, by name.
-fn lines(file: &Path) -> Result<impl Fn(&str) -> usize, CliError> {
-    let lines = config::lines(&config::read_text(file)?.1);
-    Ok(move |name: &str| lines.get(&format!("constraints.{name}")).copied().unwrap_or(usize::MAX))
-}
-
-/// Constrains the model by a file's table, as far as the constraints are independent at some states.
-///
-/// # Errors
-/// A usage error for a file without such a table or a mistake in a formula, constraints that contradict each other, or a model that has
-/// constraints of its own.
-pub fn constrained<S: Scalar>(
-    model: Box<dyn EulerLagrange<S>>,
-    columns: &[String],
-    file: &Path,
-    (q, v): (&[S], &[S]),
-) -> Result<Box<dyn EulerLagrange<S>>, CliError> {
-    let wrong = |problem: &dyn std::fmt::Display| CliError::usage(format_args!("{}: {problem}", file.display()));
-    let formulas = formulas(file)?;
-    if model.manifold().is_some() {
-        return Err(wrong(&"the motion has constraints of its own"));
-    }
-    let plain = |values: &[S]| values.iter().map(|x| x.to_f64()).collect::<Vec<f64>>();
-    let constraints =
-        FormulaConstraints::new(&columns[..columns.len() / 2], formulas).map_err(|error| wrong(&error))?;
-    let constraints = constraints.in_order(lines(file)?);
-    let (constraints, _) = constraints.independent(&plain(q), &plain(v)).map_err(|error| wrong(&error))?;
-    constraints.constrain(model).map_err(|error| wrong(&error))
+    let files = args.page.files(None, &[Path::new(name)], OutputFile::claim)?;
+    files.write_page("Constraints of a Lagrangian", &examined.findings(), &[])?;
+    files.print(&output::shown(&examined, args.json, ExaminedLagrangian::findings)?)
 }

@@ -18,14 +18,6 @@ pub struct PageArgs {
 }
 
 impl PageArgs {
-    /// The file, checked to be free, if one was requested.
-    ///
-    /// # Errors
-    /// Those of [`OutputFile::claim`].
-    pub fn claim<'a>(&'a self, inputs: &[&Path]) -> Result<Option<OutputFile<'a>>, CliError> {
-        self.html.as_deref().map(|html| OutputFile::claim(html, inputs, self.overwrite)).transpose()
-    }
-
     /// Claims the files of a result of these inputs, as far as they were requested: that of `--out` by `claim`, such as
     /// [`OutputFile::claim_system`], then the page.
     ///
@@ -68,19 +60,4 @@ impl ResultFiles<'_> {
     pub fn print(self, text: &str) -> Result<(), CliError> {
         OutputFile::print(self.out, text)
     }
-}
-
-/// Writes the page of a report.
-///
-/// # Errors
-/// Those of [`OutputFile::write`].
-pub fn write(
-    page: Option<OutputFile<'_>>,
-    title: &str,
-    findings: &Findings,
-    figures: &[Figure],
-) -> Result<(), CliError> {
-    let Some(page) = page else { return Ok(()) };
-    let report = Report::new(title).findings(findings).section("Pictures", figures);
-    page.write(report.to_html().as_bytes())
 }
