@@ -893,6 +893,9 @@ class View:
     drift : float or None
         Largest ``g(k, k)`` at the end of a ray from the sky over the sizes of its terms.
     seconds, rays_per_second : float
+    second_share, throat_radius : float or None
+        Of a wormhole: share of the pixels that show the second region, and the angular radius of the throat's image in degrees; the edge
+        and the area are those of this image.
     """
 
     share: float
@@ -906,6 +909,8 @@ class View:
     steps: int
     seconds: float
     rays_per_second: float
+    second_share: float | None = None
+    throat_radius: float | None = None
 
 
 @dataclass(frozen=True)

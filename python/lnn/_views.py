@@ -57,7 +57,7 @@ def shadow(
     model: Model | None = None,
     *,
     time: str = "t",
-    space: Sequence[str] = ("x", "y", "z"),
+    space: Sequence[str] = (),
     distance: float = 20.0,
     inclination: float = 80.0,
     azimuth: float = 0.0,
@@ -78,7 +78,8 @@ def shadow(
     system, model : System or str, Model
         The exact metric, a learned one, or both: the picture then shows the two and their difference.
     time, space : str, sequence of str
-        Time coordinate, and Cartesian coordinates around the centre, the last along the axis.
+        Time coordinate, and Cartesian coordinates around the centre, the last along the axis; or those of a wormhole: a radial one, the
+        angle from the axis, the angle about it. By default x, y, z if there are such, otherwise the three beside the time.
     distance, inclination, azimuth : float
         Where the camera is: distance from the centre in the unit of the coordinates, angles from the axis and about it in degrees.
     observer : str

@@ -5,7 +5,7 @@ use crate::errors::{choice, value};
 use crate::readings::shown;
 use crate::subject::Subject;
 use lnn::lagrangian::EulerLagrange;
-use lnn::pipeline::Event;
+use lnn::pipeline::{Event, require_memory};
 use lnn::relativity::{Camera, Chart, Observer, Scene, Tracing};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -36,8 +36,10 @@ impl Choices {
             let found = coordinates.iter().position(|coordinate| coordinate == name);
             found.ok_or_else(|| value(format_args!("{what}: no coordinate {name:?} among {coordinates:?}")))
         };
-        let [x, y, z] = self.space.as_slice() else {
-            return Err(value(format_args!("space: expected three names, found {}", self.space.len())));
+        let usual = Chart::usual_space(coordinates, &self.time);
+        let space = if self.space.is_empty() { &usual } else { &self.space };
+        let [x, y, z] = space.as_slice() else {
+            return Err(value(format_args!("space: expected three names, found {}", space.len())));
         };
         Ok(Chart {
             time: place("time", &self.time)?,
@@ -88,7 +90,8 @@ pub fn shadow<'py>(
     let unit = exact.or(learned).and_then(Subject::time_unit);
     let metrics: Vec<(&str, Box<dyn EulerLagrange<f64> + '_>)> =
         subjects.iter().map(|(name, subject)| (*name, Box::new(subject.moving()) as _)).collect();
-    let scene = Scene::new(metrics, &[], camera, tracing, choices.far).map_err(value)?;
+    let scene = Scene::new(metrics, &last.periodic(), camera, tracing, choices.far).map_err(value)?;
+    require_memory("the picture", scene.bytes()).map_err(value)?;
     let (total, done) = (scene.rays(), AtomicUsize::new(0));
     let (json, image) = whole(py, progress.as_ref(), |watch| {
         let advance = |rays: usize| {

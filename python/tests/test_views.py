@@ -45,6 +45,13 @@ def test_the_horizon_of_a_black_hole_is_found():
             hole.surfaces(**{"block": ["t"], "start": start, "end": end, **wrong})
 
 
+def test_a_wormhole_has_a_second_sky():
+    system = lnn.System.from_toml(ROOT / "examples/systems/wormhole.toml")
+    found = lnn.shadow(system, distance=3.0, inclination=75.0, width=24, edges=8, threads=1)
+    view = found.views["exact"]
+    assert view.second_share > 0.05 and view.throat_radius > 5.0
+
+
 def test_the_shadow_of_a_black_hole_has_its_size():
     events = []
     found = lnn.shadow("schwarzschild-cartesian", width=24, edges=8, threads=1, progress=lambda *event: events.append(event))
