@@ -41,7 +41,7 @@
 //! | find the constants of a Lagrangian whose form is known | [`identification`] |
 //! | read a system of your own from its file | `pipeline::parse_system` (feature `pipeline`), [`lagrangian::SystemInstance::new`] |
 //! | draw random numbers that a seed repeats | [`random`] |
-//! | see the shadow of a black hole and the sky around it | [`relativity::Shadow::of`], [`relativity::Outline::of`] |
+//! | see the shadow of a black hole and the sky around it | [`relativity::Scene`], [`relativity::Shadow::of`], [`relativity::Outline::of`] |
 //! | prove where a mass matrix has its signature | [`certificate`] |
 //! | test a model: energy, coordinates, Lyapunov exponents | [`analysis`] |
 //! | end a long search, or see how far it is | [`cancellation::Cancellation`] |

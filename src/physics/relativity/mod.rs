@@ -41,7 +41,7 @@ pub use coordinates::{CentralCoordinates, Chart};
 pub use rays::{Ray, RayOutcome, Tracing};
 #[cfg(feature = "training")]
 pub use readings::{LearnedHole, Reading};
-pub use report::{NamedMetric, ShadowSummary, View, ViewDifference, ViewSummary};
+pub use report::{ShadowSummary, View, ViewDifference, ViewSummary};
 pub use scene::Scene;
 pub use shadow::{Edge, Outline, Shadow};
 pub use sky::{Image, Sky};

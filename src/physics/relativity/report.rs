@@ -1,14 +1,11 @@
 //! Views through metrics, and their report.
 
-use super::{Camera, Image, Outline, RelativityError, Shadow, Tracing, difference_image};
+use super::{Camera, Image, Outline, RelativityError, Shadow, Tracing};
 use crate::findings::Findings;
-use crate::lagrangian::{EulerLagrange, Interruptible};
 use crate::names::{percentage, pluralize, rounded};
 use crate::relativity::Sky;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 /// Rays through a metric, and the edge of its shadow.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,61 +20,8 @@ pub struct View {
     pub seconds: f64,
 }
 
-/// A metric with its name, `exact` or `learned`.
-pub type NamedMetric<'a> = (&'static str, &'a dyn EulerLagrange<f64>);
-
-impl View {
-    /// Renders metrics with a camera, one after the other, until a flag is raised, and finds the edges of the shadows in a number of
-    /// directions, if requested.
-    ///
-    /// `begin` receives the name of a metric before its rays are followed, `advance` the number of pixels of every finished block.
-    ///
-    /// # Errors
-    /// [`RelativityError`].
-    pub fn of(
-        metrics: &[NamedMetric<'_>],
-        (camera, tracing, edges): (&Camera, &Tracing, usize),
-        stop: &AtomicBool,
-        begin: &dyn Fn(&str),
-        advance: &(dyn Fn(usize) + Sync),
-    ) -> Result<Vec<Self>, RelativityError> {
-        let mut views = Vec::new();
-        for (name, model) in metrics {
-            if stop.load(Ordering::Relaxed) {
-                break;
-            }
-            begin(name);
-            let began = Instant::now();
-            let model = Interruptible::new(*model, stop);
-            let shadow = Shadow::of(&model, camera, tracing, advance)?;
-            let seconds = began.elapsed().as_secs_f64();
-            let edge = if edges == 0 { Ok(None) } else { Outline::of(&model, camera, tracing, edges) };
-            // An edge between rays that were not followed does not count.
-            let outline = if stop.load(Ordering::Relaxed) { None } else { edge? };
-            views.push(View { name, shadow, outline, seconds });
-        }
-        Ok(views)
-    }
-}
-
-/// White columns between pictures.
-const GAP: usize = 8;
-
-impl Camera {
-    /// The pictures of views of one camera side by side; two views also get a picture of their difference.
-    ///
-    /// # Errors
-    /// Views of different sizes.
-    pub fn picture(&self, views: &[View]) -> Result<Image, RelativityError> {
-        let mut images = images(self, views);
-        if let [exact, learned] = views {
-            images.push(difference_image(&exact.shadow, &learned.shadow)?);
-        }
-        Ok(Image::beside(&images, GAP))
-    }
-}
-
-fn images(camera: &Camera, views: &[View]) -> Vec<Image> {
+/// The picture of each view.
+pub(super) fn images(camera: &Camera, views: &[View]) -> Vec<Image> {
     let sky = Sky::around(camera);
     views.iter().map(|view| sky.image(&view.shadow)).collect()
 }
@@ -191,7 +135,7 @@ impl ShadowSummary {
     ///
     /// # Errors
     /// Views of different sizes.
-    pub fn of(
+    pub(super) fn of(
         (system, unit): (&str, Option<&str>),
         (camera, tracing): (&Camera, &Tracing),
         views: &[View],

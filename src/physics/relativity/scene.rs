@@ -1,10 +1,17 @@
 //! Metrics before a camera: what is computed for a picture, whether of one metric or of two side by side.
 
 use super::coordinates::time_moves_alone;
+use super::report::images;
 use super::thresholds::PIXEL_BYTES;
-use super::{Camera, Chart, Image, NamedMetric, RelativityError, ShadowSummary, Tracing, TwoSided, View};
-use crate::lagrangian::EulerLagrange;
-use std::sync::atomic::AtomicBool;
+use super::{
+    Camera, Chart, Image, Outline, RelativityError, Shadow, ShadowSummary, Tracing, TwoSided, View, difference_image,
+};
+use crate::lagrangian::{EulerLagrange, Interruptible};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// White columns between pictures.
+const GAP: usize = 8;
 
 /// A metric that belongs to a scene, with its name, `exact` or `learned`.
 type OwnMetric<'a> = (&'static str, Box<dyn EulerLagrange<f64> + 'a>);
@@ -82,11 +89,13 @@ impl<'a> Scene<'a> {
         (self.rays() as u64).checked_mul(PIXEL_BYTES)
     }
 
-    /// Renders the metrics, one after the other, as [`View::of`] does; `edges` is the number of directions in which the edges of the
-    /// shadows are found.
+    /// Renders the metrics, one after the other, until a flag is raised, and finds the edges of the shadows in a number of directions, none if
+    /// `edges` is 0.
+    ///
+    /// `begin` receives the name of a metric before its rays are followed, `advance` the number of pixels of every finished block.
     ///
     /// # Errors
-    /// Those of [`View::of`].
+    /// [`RelativityError`].
     pub fn views(
         &self,
         edges: usize,
@@ -94,16 +103,35 @@ impl<'a> Scene<'a> {
         begin: &dyn Fn(&str),
         advance: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<View>, RelativityError> {
-        let metrics: Vec<NamedMetric<'_>> = self.metrics.iter().map(|(name, model)| (*name, &**model)).collect();
-        View::of(&metrics, (&self.camera, &self.tracing, edges), stop, begin, advance)
+        let (camera, tracing) = (&self.camera, &self.tracing);
+        let mut views = Vec::new();
+        for (name, model) in &self.metrics {
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
+            begin(name);
+            let began = Instant::now();
+            let model = Interruptible::new(&**model, stop);
+            let shadow = Shadow::of(&model, camera, tracing, advance)?;
+            let seconds = began.elapsed().as_secs_f64();
+            let edge = if edges == 0 { Ok(None) } else { Outline::of(&model, camera, tracing, edges) };
+            // An edge between rays that were not followed does not count.
+            let outline = if stop.load(Ordering::Relaxed) { None } else { edge? };
+            views.push(View { name, shadow, outline, seconds });
+        }
+        Ok(views)
     }
 
-    /// The pictures of the views side by side, as [`Camera::picture`] draws them.
+    /// The pictures of the views side by side; two views also get a picture of their difference.
     ///
     /// # Errors
     /// Views of different sizes.
     pub fn picture(&self, views: &[View]) -> Result<Image, RelativityError> {
-        self.camera.picture(views)
+        let mut images = images(&self.camera, views);
+        if let [exact, learned] = views {
+            images.push(difference_image(&exact.shadow, &learned.shadow)?);
+        }
+        Ok(Image::beside(&images, GAP))
     }
 
     /// The figures of the views, with the name of the system and the unit of its coordinates, if that is known. Distances are radial
