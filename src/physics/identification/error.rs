@@ -182,10 +182,11 @@ pub enum IdentifyError {
 }
 
 impl IdentifyError {
-    /// The option with a value that cannot be used: a field of [`IdentifyOptions`](super::IdentifyOptions), such as `offsets`, or the key
-    /// `per` of a parameter of the system; `system` if its constants cannot be identified; `None` if the recording is at fault.
+    /// The option with a value that cannot be used: a field of [`IdentifyOptions`](super::IdentifyOptions), such as `offsets`; `system` if its
+    /// constants cannot be identified; `None` if the recording is at fault.
     pub fn option(&self) -> Option<&'static str> {
         match self {
+            Self::Option { what: "per", .. } => Some("system"),
             Self::Constant { .. } => Some("constants"),
             Self::Repeated { what, .. }
             | Self::Sensor { what, .. }

@@ -228,7 +228,7 @@ fn drives_of_a_closed_chain_make_its_motion() {
         assert!(found.code == Some(code) && found.stderr.contains(part), "{}", found.stderr);
     };
     wrong("x3", 2, "--drives: unknown coordinate \"x3\"");
-    wrong("x2,x2", 2, "--drives: expected at least 1 different coordinates");
+    wrong("x2,x2", 2, "--drives: coordinate x2 is given twice");
     // At its dead centre the slider moves nothing.
     fs::write(&states, format!("{}\n1,0,3,0,1,0,-1,0,-1.5\n", lines[0])).unwrap();
     wrong("x2", 1, "drives stand still");

@@ -314,7 +314,7 @@ fn bad_states_are_data_errors() {
     refused(b"theta1,theta2,theta1_dot,theta1\n1,2,3,4\n", &["duplicate column theta1"]);
     refused(b"theta1;theta2;theta1_dot;theta2_dot\n1;2;3\n", &["expected 4 fields separated by semicolons, found 3"]);
     refused(b"1,2,3,4\n", &["expected a header with the columns theta1,theta2"]);
-    refused(HEADER.as_bytes(), &["no states"]);
+    refused(HEADER.as_bytes(), &["no rows"]);
     refused(b"", &["empty"]);
     refused(b"\xff\xfe\x00", &["row 1: not UTF-8"]);
 

@@ -1,6 +1,7 @@
 //! Source of the motion for a roll-out: a trained model, or a system.
 
 use crate::CliError;
+use crate::arguments::constraints::constrained;
 use crate::arguments::forces;
 use crate::arguments::forces::KnownForce;
 use crate::arguments::learned::{Learned, model_file};
@@ -8,7 +9,6 @@ use crate::arguments::number::finite;
 use crate::arguments::probe::Probe;
 use crate::arguments::source::{Source, parameter};
 use crate::arguments::system_arg::{self, learned_system};
-use crate::commands::constraints::constrained;
 use lnn::lagrangian::{EulerLagrange, SystemInstance};
 use lnn::report::with_unit;
 use lnn::rollout::{Domain, Event};

@@ -1,7 +1,6 @@
 //! `lnn constraints`: constraints of recorded motion, or constraints and degenerate directions of a Lagrangian.
 
 use crate::CliError;
-pub use crate::arguments::constraints::constrained;
 use crate::arguments::number::whole;
 use crate::arguments::probe::Probe;
 use crate::arguments::recording_args::{RecordingArgs, data_or};

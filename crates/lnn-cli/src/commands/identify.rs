@@ -157,7 +157,7 @@ fn refused(error: IdentifyError) -> CliError {
         (_, Some(name @ ("offsets" | "gains" | "delays"))) => {
             CliError::option(name.trim_end_matches('s'), name, &error)
         }
-        (_, Some(name)) => CliError::option(name, name, &error),
+        (_, Some(name)) => CliError::option(&name.replace('_', "-"), name, &error),
         (_, None) => CliError::data(&error),
     }
 }

@@ -1,10 +1,10 @@
 //! `lnn inspect`: prints the Euler-Lagrange terms of states with all digits.
 
 use crate::CliError;
+use crate::arguments::constraints::constrained;
 use crate::arguments::input;
 use crate::arguments::number::{Precision, in_precision, list};
 use crate::arguments::source::{Source, SystemOrModel};
-use crate::commands::constraints::constrained;
 use crate::commands::inverse::inverse;
 use crate::terminal::format::{Format, chunk, print_rows};
 use crate::terminal::output;
