@@ -559,7 +559,7 @@ class Undetermined:
         Combinations that are known nevertheless, by their formula.
     relative_error : float or None
         Largest standard error along a direction over the values; None where the motion does not depend on one at all.
-    text, cure : str
+    text, advice : str
         What is open, and what would determine it, in words.
     """
 
@@ -568,7 +568,7 @@ class Undetermined:
     known: dict[str, Combination]
     relative_error: float | None
     text: str
-    cure: str
+    advice: str
 
 
 @dataclass(frozen=True)

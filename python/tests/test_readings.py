@@ -183,7 +183,7 @@ def test_what_motion_leaves_open_is_said_with_its_cure(swung):
     assert known.terms in ({"g": 1, "l": -1}, {"l": 1, "g": -1}) and known.product
     truth = 9.8 ** known.terms["g"] * 0.7 ** known.terms["l"]
     assert abs(known.value - truth) < 4 * known.standard_error < 1e-2 * truth
-    assert open_ones[0].text and open_ones[0].cure
+    assert open_ones[0].text and open_ones[0].advice
     mass = [direction for direction in found.undetermined if direction.constants == ("m",)]
     assert len(mass) == 1 and found.constants["m"].standard_error is None and found.constants["m"].value == 1.0
 

@@ -362,7 +362,7 @@ fn learned(seeds: u64, (count, epochs, noise): (usize, usize, f64), only: &dyn F
                 learned.test_loss,
                 off.error.median,
                 off.error.max,
-                moved(name, &*exact, &*motion, seed),
+                rolled_out(name, &*exact, &*motion, seed),
                 started.elapsed().as_secs_f64()
             );
         }
@@ -370,7 +370,7 @@ fn learned(seeds: u64, (count, epochs, noise): (usize, usize, f64), only: &dyn F
 }
 
 /// Roll-outs of a learned motion where angles have a pole, a gimbal lock, or nothing of the kind.
-fn moved(name: &str, exact: &dyn EulerLagrange<f64>, learned: &dyn EulerLagrange<f64>, seed: u64) -> String {
+fn rolled_out(name: &str, exact: &dyn EulerLagrange<f64>, learned: &dyn EulerLagrange<f64>, seed: u64) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(7 + seed);
     let mut draw = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
     let options = |end: f64| RolloutOptions::new(end, end / 100.0).tolerances(1e-9, 1e-9).energy(false);

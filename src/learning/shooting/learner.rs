@@ -137,7 +137,7 @@ impl<S: Scalar> Learner<S> for ShootingLearner<S> {
     fn step(&mut self, problem: &mut Self::Problem, weights: &[S], rows: &[u32], gradient: &mut [S]) -> BatchReport<S> {
         let ShootingProblem { shots, training, .. } = problem;
         let Starts { at, curvature } = &mut self.starts;
-        shots.settle(weights, training, (at, rows), (curvature, &mut self.start_gradient), self.share);
+        shots.move_starts(weights, training, (at, rows), (curvature, &mut self.start_gradient), self.share);
         let report = shots.step(weights, training, at, rows, (gradient, &mut self.start_gradient));
         let ShootingReport { loss, gap, penalty, penalised, left_out, residuals } = report;
         self.last = (residuals, gap.to_f64());

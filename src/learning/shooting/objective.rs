@@ -387,7 +387,7 @@ impl<S: Scalar> ShootingObjective<S> {
 
     /// Moves the starts of the segments `rows`, and a little those of their followers, by `share` of a Gauss-Newton step
     /// with the derivatives that `curvature` holds of an earlier [`refine`](Self::refine): one forward integration.
-    pub fn settle(
+    pub fn move_starts(
         &mut self,
         weights: &[S],
         segments: &Segments<S>,

@@ -1,6 +1,6 @@
 //! Names of constants, shared by equal coefficients, and fractions near them.
 
-use super::found::{FoundFormula, Near};
+use super::found::{FoundFormula, NearFraction};
 use super::thresholds::{CHANCE_FRACTION, CONSTANT_ERRORS, EQUAL_CONSTANTS_ERROR, MOST_DENOMINATOR, MOST_NUMERATOR};
 use super::units::{Dimension, of_coefficient};
 use crate::identification::linear::{inverse, part};
@@ -67,7 +67,7 @@ impl FoundFormula {
 }
 
 /// A fraction of small integers within two standard errors, if the number is known well enough that this is not by chance.
-fn near(x: f64, error: f64) -> Option<Near> {
+fn near(x: f64, error: f64) -> Option<NearFraction> {
     if !(x.is_finite() && error.is_finite()) {
         return None;
     }
@@ -79,7 +79,7 @@ fn near(x: f64, error: f64) -> Option<Near> {
         if rare && top != 0.0 && top.abs() <= MOST_NUMERATOR && (x - top / f64::from(bottom)).abs() <= within {
             let fraction = if bottom == 1 { format!("{top}") } else { format!("{top}/{bottom}") };
             let off = x - top / f64::from(bottom);
-            return Some(Near { fraction, standard_errors: if error > 0.0 { off / error } else { 0.0 } });
+            return Some(NearFraction { fraction, standard_errors: if error > 0.0 { off / error } else { 0.0 } });
         }
     }
     None

@@ -267,7 +267,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     /// Errors of 400 windows, 0.25 s apart, of one coordinate that a force and a factor of a function may drive.
-    fn rest(seed: u64, mut error: impl FnMut(f64, f64) -> f64) -> Residuals {
+    fn residuals(seed: u64, mut error: impl FnMut(f64, f64) -> f64) -> Residuals {
         let mut rng = RngStream::Trajectories.generator(seed);
         let mut draw = || <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut rng);
         let times: Vec<f64> = (0..400).map(|k| 0.25 * f64::from(k)).collect();
@@ -286,11 +286,11 @@ mod tests {
     #[test]
     fn a_line_is_found_at_its_frequency() {
         for seed in 0..20 {
-            let found = line(&rest(seed, |t, noise| (2.3 * t + 0.4).cos() + noise)).unwrap();
+            let found = line(&residuals(seed, |t, noise| (2.3 * t + 0.4).cos() + noise)).unwrap();
             // The standard error is sqrt(24 / 400) / 100.
             assert!((found.frequency - 2.3).abs() < 4.0 * 2.5e-3, "{seed} {found:?}");
             let shaken = |t: f64| (0.7 * t + (0.31 * t).sin()).cos() * (5.1 * t + 1.0).sin();
-            let found = line(&rest(seed, |t, noise| 2.0 * shaken(t) + noise)).unwrap();
+            let found = line(&residuals(seed, |t, noise| 2.0 * shaken(t) + noise)).unwrap();
             assert!((found.frequency - 5.1).abs() < 0.02, "{seed} {found:?}");
         }
     }
@@ -299,11 +299,11 @@ mod tests {
     fn continuous_spectra_have_no_line() {
         let seeds = 60;
         let alarms = |make: &dyn Fn(u64) -> Residuals| (0..seeds).filter(|&seed| line(&make(seed)).is_some()).count();
-        assert!(alarms(&|seed| rest(seed, |_, noise| noise)) <= 1);
+        assert!(alarms(&|seed| residuals(seed, |_, noise| noise)) <= 1);
         // Correlated over 1 s.
         let red = |seed| {
             let mut last = 0.0;
-            rest(seed, move |_, noise| {
+            residuals(seed, move |_, noise| {
                 last = 0.78 * last + noise;
                 last
             })
@@ -312,7 +312,7 @@ mod tests {
         // A sign that changes at random.
         let jumps = |seed| {
             let mut sign = 1.0;
-            rest(seed, move |_, noise| {
+            residuals(seed, move |_, noise| {
                 sign *= if noise > 1.0 { -1.0 } else { 1.0 };
                 sign + 0.1 * noise
             })
@@ -324,7 +324,7 @@ mod tests {
     fn a_line_is_found_though_its_neighbours_explain_the_residuals_too() {
         // A drive whose effect decays within two periods: its line is as wide as the background that it is compared with.
         let effect = |t: f64| (-t / 6.0).exp();
-        let mut decaying = rest(0, |t, _| effect(t) * (1.3 * t + 0.4).cos());
+        let mut decaying = residuals(0, |t, _| effect(t) * (1.3 * t + 0.4).cos());
         let errors: Vec<f64> = decaying.times.iter().map(|t| effect(*t) * (1.3 * t + 0.4).cos()).collect();
         let effects: Vec<f64> = decaying.times.iter().map(|t| effect(*t)).collect();
         assert!(line(&decaying).is_none());
@@ -339,13 +339,13 @@ mod tests {
         let step = TAU / 100.0 / FREQUENCIES_PER_RESOLUTION;
         let low = 3.0 * TAU / 100.0;
         let [halfway, upon] = [low + 60.5 * step, low + 140.0 * step];
-        let found = line(&rest(1, |t, _| 1.01 * (halfway * t).cos() + (upon * t).cos())).unwrap();
+        let found = line(&residuals(1, |t, _| 1.01 * (halfway * t).cos() + (upon * t).cos())).unwrap();
         assert!((found.frequency - halfway).abs() < step / 4.0, "{found:?} {halfway} {upon}");
     }
 
     #[test]
     fn a_band_without_neighbours_has_no_line() {
-        let few = |high: f64| Residuals { band: [1.0, high], ..rest(3, |t, noise| 5.0 * (1.2 * t).cos() + noise) };
+        let few = |high: f64| Residuals { band: [1.0, high], ..residuals(3, |t, noise| 5.0 * (1.2 * t).cos() + noise) };
         assert!(line(&few(1.0 + 5.0 * TAU / 100.0)).is_none() && line(&few(10.0)).is_some());
     }
 

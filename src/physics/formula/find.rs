@@ -7,7 +7,7 @@ use super::extent::Drive;
 use super::families::Families;
 use super::found::{FoundDrive, FoundFormula, Rival, Verdict};
 use super::function::Notation;
-use super::judged::Judged;
+use super::held_out_test::HeldOutTest;
 use super::library::{Library, Values};
 use super::motion::{BlockSum, Model, Motion};
 use super::prepared::Prepared;
@@ -133,7 +133,7 @@ impl WeakForm {
             stop.check()?;
             let apart = eliminate(&windows.apart(&alone), &data.speeds);
             let Some(choice) = best(&apart) else { break };
-            if best(&path).is_none_or(|whole| judged(choice) <= STARTING_ERROR * judged(whole)) {
+            if best(&path).is_none_or(|whole| score(choice) <= STARTING_ERROR * score(whole)) {
                 path = apart.before(path);
                 break;
             }
@@ -151,7 +151,7 @@ impl WeakForm {
 
     /// The smallest held-out error of choices with which the search through the motion may start.
     pub fn least(&self) -> f64 {
-        best(&self.path).map_or(f64::INFINITY, judged)
+        best(&self.path).map_or(f64::INFINITY, score)
     }
 
     /// Fits the choice to the motion, or another choice of the weak form if that gives no formula.
@@ -205,10 +205,10 @@ impl WeakForm {
         let estimates = (covariance.coefficients.as_slice(), probability.as_slice());
         let mut found = FoundFormula::new(&self.library, periodic, &model, estimates, options);
         let residuals = search.motion.residuals(&model, &validation);
-        let judged =
-            Judged { search: &search, model: &model, segments: &validation, residuals: &residuals, square, count };
+        let test =
+            HeldOutTest { search: &search, model: &model, segments: &validation, residuals: &residuals, square, count };
         found.set_bootstraps(&self.library, &model, &resampled.coefficients);
-        self.describe(&mut found, &judged);
+        self.describe(&mut found, &test);
         if let Some(rival) = rival {
             found.several = rival.cost < TERM_COST;
             found.rival = Some(self.rival(&rival));
@@ -219,7 +219,7 @@ impl WeakForm {
         if let (Some(Drive { name, .. }), Some(standard_error)) = (&self.library.drive, covariance.frequency) {
             found.drive = Some(FoundDrive { name: name.clone(), frequency: model.frequency, standard_error });
         }
-        self.judge(&mut found, &judged, covariance.converged);
+        self.judge(&mut found, &test, covariance.converged);
         Ok(found)
     }
 
@@ -252,12 +252,12 @@ impl WeakForm {
     }
 
     /// Reports the held-out motion and the data of a search.
-    fn describe(&self, found: &mut FoundFormula, judged: &Judged<'_>) {
-        let motion = &judged.search.motion;
+    fn describe(&self, found: &mut FoundFormula, test: &HeldOutTest<'_>) {
+        let motion = &test.search.motion;
         let data = motion.data;
-        found.paths = judged.paths();
-        found.residual = judged.residual();
-        found.left = left_over(motion, judged.model, judged.segments);
+        found.paths = test.paths();
+        found.residual = test.residual();
+        found.left = left_over(motion, test.model, test.segments);
         found.forced.clone_from(&data.forced);
         found.noise = data.sigma.clone();
         found.noise_resolved = data.resolved;
@@ -277,15 +277,15 @@ impl WeakForm {
     }
 
     /// Sets the verdict on a formula, with the reasons for doubt; `converged` refers to the fit of its coefficients.
-    fn judge(&self, found: &mut FoundFormula, judged: &Judged<'_>, converged: bool) {
+    fn judge(&self, found: &mut FoundFormula, test: &HeldOutTest<'_>, converged: bool) {
         if !converged {
             found.doubts.push("the fit of the coefficients has not converged".to_string());
         }
-        found.doubts.extend(judged.doubts());
+        found.doubts.extend(test.doubts());
         if found.drive.is_some() {
-            found.doubts.extend(drive_doubts(&judged.search.motion, judged.model));
+            found.doubts.extend(drive_doubts(&test.search.motion, test.model));
         }
-        found.verdict = judged.verdict(&found.doubts);
+        found.verdict = test.verdict(&found.doubts);
         if found.verdict == Verdict::NotInLibrary {
             found.doubts.clear();
         }
@@ -349,24 +349,24 @@ pub(super) fn held_out(data: &Prepared<'_>, seed: u64) -> BTreeSet<usize> {
 /// choices near the smallest error.
 fn starting_choices<'a>(path: &'a Path, windows: &Windows) -> Vec<&'a Choice> {
     let few: Vec<&'a Choice> = path.best.values().filter(|choice| choice.set.len() <= MOST_STARTING_TERMS).collect();
-    let least = few.iter().map(|choice| judged(choice)).fold(f64::INFINITY, f64::min);
-    let near = |most: f64| few.iter().copied().filter(move |choice| judged(choice) <= most * least);
+    let least = few.iter().map(|choice| score(choice)).fold(f64::INFINITY, f64::min);
+    let near = |most: f64| few.iter().copied().filter(move |choice| score(choice) <= most * least);
     let definite = |most: f64| near(most).find(|choice| windows.is_definite(&choice.coefficients));
     let first = definite(STARTING_ERROR).or_else(|| definite(DEFINITE_ERROR)).or_else(|| near(STARTING_ERROR).next());
     let Some(first) = first else { return Vec::new() };
     let mut others: Vec<&Choice> = near(DEFINITE_ERROR).filter(|choice| choice.set != first.set).collect();
-    others.sort_by(|a, b| judged(a).total_cmp(&judged(b)));
+    others.sort_by(|a, b| score(a).total_cmp(&score(b)));
     [first].into_iter().chain(others.into_iter().take(OTHER_STARTING_CHOICES)).collect()
 }
 
 /// The choice with the smallest error that the search through the motion may start with.
 pub(super) fn best(path: &Path) -> Option<&Choice> {
     let few = path.best.values().filter(|choice| choice.set.len() <= MOST_STARTING_TERMS);
-    few.min_by(|a, b| judged(a).total_cmp(&judged(b)))
+    few.min_by(|a, b| score(a).total_cmp(&score(b)))
 }
 
 /// Held-out error of a choice.
-fn judged(choice: &Choice) -> f64 {
+fn score(choice: &Choice) -> f64 {
     if choice.held_out.is_finite() { choice.held_out } else { choice.error }
 }
 

@@ -35,7 +35,7 @@ pub struct Rival {
 
 /// A simple fraction near a coefficient.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Near {
+pub struct NearFraction {
     /// The fraction, such as `1/6`.
     pub fraction: String,
     /// Difference between coefficient and fraction in standard errors; 0 if both are equal.
@@ -60,7 +60,7 @@ pub struct FoundTerm {
     /// `true` for a term of Rayleigh's dissipation function, `false` for one of the Lagrangian.
     pub dissipation: bool,
     /// A simple fraction within the error of the coefficient, if there is one.
-    pub near: Option<Near>,
+    pub near: Option<NearFraction>,
     /// Index of the term of its block with the fixed coefficient, if there is one.
     #[serde(skip)]
     pub(super) reference: Option<usize>,
@@ -80,7 +80,7 @@ pub struct FoundTerm {
 
 /// Residuals in a part of the range of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Left {
+pub struct RangeResidual {
     /// Index of the coordinate.
     pub coordinate: usize,
     /// Lower end of the part.
@@ -124,7 +124,7 @@ pub struct FoundFormula {
     /// `false` if the noise and the motion could not be separated: the noise given is then an upper bound.
     pub noise_resolved: bool,
     /// Residuals by parts of the ranges of coordinates.
-    pub left: Vec<Left>,
+    pub left: Vec<RangeResidual>,
     /// Terms searched, and how many of them were removed as total derivatives and identities.
     pub searched: (usize, usize),
     /// Families of functions in the library of the formula.

@@ -38,7 +38,7 @@ mod families;
 mod find;
 mod found;
 mod function;
-mod judged;
+mod held_out_test;
 mod ladder;
 mod library;
 mod motion;
@@ -59,7 +59,7 @@ mod written;
 pub use error::FormulaError;
 pub use families::Families;
 pub use find::FormulaOptions;
-pub use found::{FoundDrive, FoundFormula, FoundTerm, Left, Near, Rival, Verdict};
+pub use found::{FoundDrive, FoundFormula, FoundTerm, NearFraction, RangeResidual, Rival, Verdict};
 // For the packages of this repository.
 #[doc(hidden)]
 pub use thresholds::{MODEL_STATES, MOST_BOOTSTRAPS};

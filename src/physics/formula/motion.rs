@@ -5,7 +5,7 @@ use super::library::{Library, Values};
 use super::prepared::Prepared;
 use super::thresholds::{FAILED_SQUARE, FIT_STEPS, LEAST_SCORED_BLOCKS, RESCUED_RESIDUAL, SEGMENTS_AT_A_TIME};
 use crate::identification::linear::times;
-use crate::identification::{Between, Course, Disturbances, Problem, Segment, choose_steps};
+use crate::identification::{Between, Disturbances, DrivenEquations, Problem, Segment, choose_steps};
 use crate::lagrangian::system::Range;
 use crate::linalg::{self, Workspace, dot};
 use std::collections::BTreeMap;
@@ -123,7 +123,7 @@ impl Motion<'_> {
         let x = chosen.iter().map(|&at| values[at]).collect();
         let equations = self.library.equations(&model.terms, values.len(), (first, wanted)).ok()?;
         let data = self.data;
-        let course = Course {
+        let driven = DrivenEquations {
             recording: data.recording,
             equations: &equations,
             chosen: chosen.len(),
@@ -133,7 +133,7 @@ impl Motion<'_> {
             substeps: self.substeps,
         };
         let mut problem = Problem {
-            course,
+            driven,
             ranges: vec![Range::Any; values.len()],
             values,
             chosen,
@@ -189,7 +189,7 @@ impl Motion<'_> {
     /// Fits the initial states alone, with the model fixed; returns the sum of squares and the number of residuals.
     pub fn fit_initial_states(&self, model: &Model, segments: &mut [Segment], iterations: usize) -> (f64, f64) {
         let squares = self.shooting(model, (false, &[]), |problem, x| {
-            problem.settle(&x, segments, iterations);
+            problem.fit_starts(&x, segments, iterations);
             rescue(problem, &x, segments)
         });
         let squares = squares.unwrap_or(vec![(f64::INFINITY, 1.0)]);
@@ -292,7 +292,7 @@ impl Motion<'_> {
     pub fn choose_steps(&mut self, model: &Model, segments: &[Segment]) {
         let steps = self.shooting(model, (false, &[]), |problem, x| {
             choose_steps(problem, &x, segments);
-            problem.course.substeps
+            problem.driven.substeps
         });
         self.substeps = steps.unwrap_or(self.substeps);
     }
@@ -327,7 +327,7 @@ fn rescue(problem: &Problem<'_>, x: &[f64], segments: &mut [Segment]) -> Vec<(f6
             let whole = segments[k].samples;
             part.samples = ((whole as f64 * share) as usize).max(least).min(whole);
         }
-        problem.settle(x, &mut tried, 6);
+        problem.fit_starts(x, &mut tried, 6);
     }
     let after = squares(problem, x, &tried);
     for ((k, segment), after) in bad.into_iter().zip(tried).zip(after) {

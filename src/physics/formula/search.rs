@@ -1,6 +1,6 @@
 //! Chooses terms by fits to the motion.
 
-use super::found::Left;
+use super::found::RangeResidual;
 use super::function::Notation;
 use super::library::{Library, Values};
 use super::motion::{BlockSum, Model, Motion, inflation, total};
@@ -272,7 +272,7 @@ pub(super) fn covariance(search: &Search<'_>, model: &mut Model, segments: &mut 
 }
 
 /// Residuals over noise by parts of the range of every coordinate.
-pub(super) fn left_over(motion: &Motion<'_>, model: &Model, segments: &[Segment]) -> Vec<Left> {
+pub(super) fn left_over(motion: &Motion<'_>, model: &Model, segments: &[Segment]) -> Vec<RangeResidual> {
     let (n, bounds) = (motion.data.n, &motion.data.bounds);
     let mut sums = vec![[0.0; 2]; n * RESIDUAL_RANGES];
     for (segment, residuals) in segments.iter().zip(motion.residuals(model, segments)) {
@@ -291,7 +291,13 @@ pub(super) fn left_over(motion: &Motion<'_>, model: &Model, segments: &[Segment]
         let (i, at) = (e / RESIDUAL_RANGES, e % RESIDUAL_RANGES);
         let step = (bounds[i][1] - bounds[i][0]) / RESIDUAL_RANGES as f64;
         let low = bounds[i][0] + at as f64 * step;
-        Left { coordinate: i, low, high: low + step, residual: (square / count).sqrt(), samples: *count as usize }
+        RangeResidual {
+            coordinate: i,
+            low,
+            high: low + step,
+            residual: (square / count).sqrt(),
+            samples: *count as usize,
+        }
     };
     sums.iter().enumerate().map(of).filter(|left| left.samples > 0).collect()
 }

@@ -1,6 +1,6 @@
 //! A found formula as text, LaTeX, Rust and a system file.
 
-use super::found::{FoundDrive, FoundFormula, FoundTerm, Left, Rival, Verdict};
+use super::found::{FoundDrive, FoundFormula, FoundTerm, RangeResidual, Rival, Verdict};
 use crate::identification::Between;
 use serde::Serialize;
 
@@ -30,7 +30,7 @@ pub struct FormulaSummary<'a> {
     doubts: &'a [String],
     notes: &'a [String],
     forces_between_samples: Option<Between>,
-    left: &'a [Left],
+    left: &'a [RangeResidual],
     seed: u64,
 }
 

@@ -42,7 +42,7 @@ pub(super) fn copies(
     (states, x, sizes): (&States, &[f64], &[f64]),
     share: &(impl Fn(&States) -> Vec<f64> + Sync),
 ) -> Option<Copies> {
-    let recording = problem.course.recording;
+    let recording = problem.driven.recording;
     let n = recording.n();
     let tracks = || recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
     let of_force: Vec<f64> = (0..n).map(|i| noise(tracks(), n, i).sigma.min(sizes[i])).collect();
@@ -70,9 +70,9 @@ pub(super) fn copies(
             truth.as_ref().and_then(|_| smoothing.apply(track).ok())
         };
         let smoothed: Vec<Option<Smoothed>> = copied.tracks.iter().zip(&truth).map(smooth).collect();
-        let mut course = problem.course.clone();
-        course.recording = &copied;
-        let problem = Problem { course, ..problem.clone() };
+        let mut driven = problem.driven.clone();
+        driven.recording = &copied;
+        let problem = Problem { driven, ..problem.clone() };
         let (averaged, units) = (states.averaged, states.units.clone());
         let mut own = States { averaged, units, ..States::new(&problem, &smoothed) };
         own.share = share(&own);
@@ -138,8 +138,8 @@ fn required_forces(
     (states, x): (&States, &[f64]),
     (track, motion): (usize, &Smoothed),
 ) -> Vec<f64> {
-    let (n, values) = (problem.course.equations.n, problem.parameters(x));
-    let mut follower = Follower::new(&problem.course);
+    let (n, values) = (problem.driven.equations.n, problem.parameters(x));
+    let mut follower = Follower::new(&problem.driven);
     let mut force = vec![0.0; motion.q.len()];
     let mut scratch = vec![0.0; LANES * n];
     for first in (0..force.len()).step_by(LANES * n) {

@@ -9,8 +9,8 @@
 
 use super::IdentifyError;
 use super::bootstrap::{self, Copies};
-use super::course::Segment;
 use super::covariance::Root;
+use super::driven::Segment;
 use super::fitted::Fitted;
 use super::follow::Follower;
 use super::found::{Identified, Outlier, Residual, ResidualPath};
@@ -33,12 +33,12 @@ pub(super) fn identify(
     smoothing: &Smoothing,
     (mut x, segments): (Vec<f64>, Vec<Segment>),
 ) -> Result<Identified, IdentifyError> {
-    let recording = problem.course.recording;
+    let recording = problem.driven.recording;
     let start = x.clone();
     let (mut states, smoothings) = smoothed_states(problem, smoothing)?;
     check_constraints(instance, problem, &x, &states)?;
-    let (sigma, scales) = Scales::of(&states, problem.course.equations.n);
-    if problem.course.equations.rows.is_some() {
+    let (sigma, scales) = Scales::of(&states, problem.driven.equations.n);
+    if problem.driven.equations.rows.is_some() {
         states.units = units(problem, &states, &x, &scales.least);
     }
     let normal = weighted_fit(problem, (&mut states, &mut x), (sigma, &scales.least))?;
@@ -89,7 +89,7 @@ struct Smoothings {
 
 /// The smoothed states at which the forces are fitted.
 fn smoothed_states(problem: &Problem<'_>, smoothing: &Smoothing) -> Result<(States, Smoothings), IdentifyError> {
-    let recording = problem.course.recording;
+    let recording = problem.driven.recording;
     let sharper = smoothing.sharper();
     let smoothed: Vec<Option<Smoothed>> = recording.tracks.iter().map(|track| sharper.apply(track).ok()).collect();
     let mut states = States::new(problem, &smoothed);
@@ -97,7 +97,7 @@ fn smoothed_states(problem: &Problem<'_>, smoothing: &Smoothing) -> Result<(Stat
     let wider = bootstrap::wider_smoothing(recording, smoothing);
     if wider.is_some() {
         let window: usize = smoothing.coordinates.iter().map(|chosen| chosen.quality.window).sum();
-        states.averaged = window / (WINDOW_OVER_HALF_WIDTH * problem.course.equations.n * states.stride);
+        states.averaged = window / (WINDOW_OVER_HALF_WIDTH * problem.driven.equations.n * states.stride);
     }
     if states.places.is_empty() {
         return Err(IdentifyError::Lost);
@@ -236,7 +236,7 @@ fn weighted_fit(
 ) -> Result<Normal, IdentifyError> {
     let n = sigma.len();
     // Constraints leave fewer independent equations.
-    let rows = problem.course.equations.rows.as_ref().map_or(0, |rows| rows.names.len());
+    let rows = problem.driven.equations.rows.as_ref().map_or(0, |rows| rows.names.len());
     let counts = ((n - rows) as f64 / n as f64).sqrt();
     let weights = |states: &States, sigma: &[f64]| (0..states.q.len()).map(|at| counts / sigma[at % n]).collect();
     let mut search = Normal::default();
@@ -333,9 +333,9 @@ fn shares(errors: &[f64], n: usize) -> Vec<f64> {
 
 /// Standard error of every force equation, `(states, n)`: the noise of the force, and the mass matrix times the errors of the accelerations.
 fn errors(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Vec<f64> {
-    let n = problem.course.equations.n;
+    let n = problem.driven.equations.n;
     let tracks =
-        || problem.course.recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
+        || problem.driven.recording.tracks.iter().map(|track| (track.times.as_slice(), track.force.as_slice()));
     let of_force: Vec<f64> = (0..n).map(|i| noise(tracks(), n, i).sigma).collect();
     let mut all = vec![0.0; states.q.len()];
     states.batches(problem, x, |follower, range, _| {
@@ -369,7 +369,7 @@ fn units(problem: &Problem<'_>, states: &States, x: &[f64], least: &[f64]) -> Ve
 impl Problem<'_> {
     /// `true` if the equations are linear in all unknown constants together, as tested at the initial states of segments.
     pub(super) fn is_linear(&self, segments: &[Segment]) -> bool {
-        let (n, m) = (self.course.equations.n, self.chosen.len());
+        let (n, m) = (self.driven.equations.n, self.chosen.len());
         let stride = segments.len().div_ceil(LANES).max(1);
         let starts = || segments.iter().step_by(stride).map(|segment| segment.start.split_at(n));
         let q: Vec<f64> = starts().flat_map(|(q, _)| q.to_vec()).collect();
@@ -377,7 +377,7 @@ impl Problem<'_> {
         let slopes = |factor: f64| {
             let x: Vec<f64> = (0..m).map(|k| factor * (1.0 + k as f64 / m as f64)).collect();
             // Linearity can be tested at any accelerations.
-            Follower::new(&self.course).force_slopes(&self.parameters(&x), (&q, &v, &q)).to_vec()
+            Follower::new(&self.driven).force_slopes(&self.parameters(&x), (&q, &v, &q)).to_vec()
         };
         let (one, other) = (slopes(1.0), slopes(1.7));
         let rows = one.chunks_exact(2 * n + m).zip(other.chunks_exact(2 * n + m));

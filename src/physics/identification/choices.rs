@@ -1,6 +1,6 @@
 //! Checks the options and resolves them: unknown constants, sensors, errors of positions, inputs, and the quantity that is fitted.
 
-use super::course::Inputs;
+use super::driven::Inputs;
 use super::smoothed::Quantity;
 use super::solve::{Sensor, SensorKind};
 use super::{IdentifyError, IdentifyOptions};

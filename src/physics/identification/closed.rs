@@ -6,7 +6,7 @@
 //! constant changes the constraints, and back onto the constraints by projection.
 
 use super::IdentifyError;
-use super::course::{Course, Segment};
+use super::driven::{DrivenEquations, Segment};
 use super::solve::Problem;
 use super::thresholds::{FORCE_ROUNDING, LANES};
 use crate::constraints::OBEDIENCE;
@@ -169,7 +169,7 @@ pub(super) struct Mover<'a> {
     after: Box<dyn Manifold<f64>>,
 }
 
-impl Course<'_> {
+impl DrivenEquations<'_> {
     /// Number of independent changes of an initial state.
     pub fn starts(&self) -> usize {
         self.equations.rows.as_ref().map_or(2 * self.equations.n, RowEquations::freedom)
@@ -223,22 +223,22 @@ impl Problem<'_> {
     /// Moves initial states while the unknowns change from `x` to `moved`; `None` without constraints.
     pub(super) fn mover(&self, x: &[f64], moved: &[f64]) -> Option<Mover<'_>> {
         let values = self.parameters(x);
-        let (rows, before) = self.course.manifold(&values)?;
-        let (_, after) = self.course.manifold(&self.parameters(moved))?;
+        let (rows, before) = self.driven.manifold(&values)?;
+        let (_, after) = self.driven.manifold(&self.parameters(moved))?;
         let change = x.iter().zip(moved).take(self.chosen.len()).map(|(x, moved)| moved - x).collect();
         Some(Mover { rows, values, change, before, after })
     }
 
     /// Projects the initial states of segments onto the constraints.
     pub(super) fn project_starts(&self, x: &[f64], segments: &mut [Segment]) {
-        if let Some((_, manifold)) = self.course.manifold(&self.parameters(x)) {
+        if let Some((_, manifold)) = self.driven.manifold(&self.parameters(x)) {
             segments.iter_mut().for_each(|segment| project_start(&*manifold, &mut segment.start));
         }
     }
 
     /// Projects states `(q, v)` onto the constraints; those that cannot be projected become `NaN`.
     pub(super) fn project_states(&self, x: &[f64], (q, v): (&mut [f64], &mut [f64])) {
-        let (n, found) = (self.course.equations.n, self.course.manifold(&self.parameters(x)));
+        let (n, found) = (self.driven.equations.n, self.driven.manifold(&self.parameters(x)));
         let Some((_, manifold)) = found else { return };
         for (q, v) in q.chunks_exact_mut(n).zip(v.chunks_exact_mut(n)) {
             if project(&*manifold, q, v).is_err() {
@@ -249,8 +249,8 @@ impl Problem<'_> {
 
     /// The constraints from which smoothed states `(q, v)` are farther than their errors allow, with constants `x`.
     fn distances(&self, x: &[f64], (q, v): (&[f64], &[f64])) -> Vec<Distance> {
-        let (n, values) = (self.course.equations.n, self.parameters(x));
-        let Some((rows, manifold)) = self.course.manifold(&values) else { return Vec::new() };
+        let (n, values) = (self.driven.equations.n, self.parameters(x));
+        let Some((rows, manifold)) = self.driven.manifold(&values) else { return Vec::new() };
         let m = rows.names.len();
         let (mut squares, mut open, mut count) = (vec![[0.0; 3]; m], vec![false; m], 0.0);
         let mut found = ManifoldRows::default();
@@ -301,8 +301,8 @@ impl Problem<'_> {
 
     /// The unknown constants on which constraints depend, tested at recorded states `(q, v)`.
     pub(super) fn moves_constraints(&self, x: &[f64], (q, v): (&[f64], &[f64])) -> Vec<usize> {
-        let (n, values) = (self.course.equations.n, self.parameters(x));
-        let Some(rows) = &self.course.equations.rows else { return Vec::new() };
+        let (n, values) = (self.driven.equations.n, self.parameters(x));
+        let Some(rows) = &self.driven.equations.rows else { return Vec::new() };
         let mut moves = vec![false; self.chosen.len()];
         let states = q.chunks_exact(n).zip(v.chunks_exact(n));
         for state in states.step_by((q.len() / n).div_ceil(LANES).max(1)) {

@@ -279,9 +279,16 @@ impl Recorded {
         let (n, count, p) = (self.instance.coordinates, self.instance.parameters.len(), &self.instance.parameters);
         let recording = Recording { coordinates: Vec::new(), periodic: Vec::new(), tracks: Vec::new() };
         let (between, inputs, equations) = (Between::Linear, Vec::new(), &self.equations);
-        let course =
-            Course { recording: &recording, equations, chosen: count, between, inputs, step: 1.0, substeps: 1 };
-        let mut follower = Follower::new(&course);
+        let driven = DrivenEquations {
+            recording: &recording,
+            equations,
+            chosen: count,
+            between,
+            inputs,
+            step: 1.0,
+            substeps: 1,
+        };
+        let mut follower = Follower::new(&driven);
         let mut accelerations = |state: &[f64], p: &[f64]| {
             let mut a = vec![0.0; n];
             follower.accelerate(p, (&state[..n], &state[n..]), &[], &mut a);

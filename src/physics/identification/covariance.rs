@@ -4,7 +4,7 @@
 //! `S^-1 B S^-1` with the normal matrix `S` and the long-run covariance `B` of the scores. `B` is the mean of the outer products of their sums over
 //! all windows of one length, which is Bartlett's kernel (Newey and West, Econometrica 55 (1987) 703).
 
-use super::course::Segment;
+use super::driven::Segment;
 use super::fitted::Fitted;
 use super::linear::times;
 use super::quality::tail;
@@ -41,7 +41,7 @@ impl Weighting {
 
 /// Scores of every segment, `(samples, m)`.
 pub(super) fn scores(problem: &Problem<'_>, x: &[f64], segments: &[Segment]) -> Vec<Vec<f64>> {
-    let (starts, m) = (problem.course.starts(), problem.unknowns());
+    let (starts, m) = (problem.driven.starts(), problem.unknowns());
     let width = starts + m;
     // Response of the initial states to the unknowns, `(m, starts)`.
     let responses = problem.all(x, segments).into_iter().map(|linear| {

@@ -9,7 +9,7 @@
 //! range stays there as long as the gradient points out of the range (Bertsekas, SIAM J. Control Optim. 20 (1982) 221).
 
 use super::closed::advance;
-use super::course::Segment;
+use super::driven::Segment;
 use super::linear::times;
 use super::solve::{Linear, Normal, Problem, Sensor, SensorKind};
 use super::thresholds::{
@@ -46,7 +46,7 @@ impl Problem<'_> {
         let m = normal.right.len();
         let stepped = |(k, (&x, d)): (usize, (&f64, f64))| match k.checked_sub(self.chosen.len()) {
             Some(sensor) if self.sensors[sensor].kind == SensorKind::Delay => {
-                (x + d).clamp(-MOST_DELAY * self.course.step, MOST_DELAY * self.course.step)
+                (x + d).clamp(-MOST_DELAY * self.driven.step, MOST_DELAY * self.driven.step)
             }
             Some(_) => x + d,
             None if self.ranges[self.chosen[k]] == Range::Positive => {
@@ -71,7 +71,7 @@ impl Problem<'_> {
             None => x.abs(),
             Some(Sensor { kind: SensorKind::Offset, coordinate }) => self.spread[coordinate],
             Some(Sensor { kind: SensorKind::Gain, .. }) => 1.0,
-            Some(Sensor { kind: SensorKind::Delay, .. }) => USUAL_DELAY * self.course.step,
+            Some(Sensor { kind: SensorKind::Delay, .. }) => USUAL_DELAY * self.driven.step,
         }
     }
 
@@ -188,7 +188,7 @@ impl Problem<'_> {
     }
 
     /// Fits only the initial states, each segment separately; `false` if the sum of squares still decreases.
-    pub fn settle(&self, x: &[f64], segments: &mut [Segment], iterations: usize) -> bool {
+    pub fn fit_starts(&self, x: &[f64], segments: &mut [Segment], iterations: usize) -> bool {
         let no_change = vec![0.0; self.unknowns()];
         self.project_starts(x, segments);
         let mover = self.mover(x, x);

@@ -1,7 +1,7 @@
 //! The fit of the first segments. It starts from a fit to smoothed accelerations, or from a search of initial states if a coordinate was not
 //! measured.
 
-use super::course::Segment;
+use super::driven::Segment;
 use super::fitted::{Fitted, log, refit};
 use super::initial_states::Search;
 use super::pieces::Pieces;
@@ -106,14 +106,14 @@ fn fit_first_segments(
         }
     }
     let best = best.ok_or(IdentifyError::Lost)?;
-    problem.course.substeps = best.substeps;
+    problem.driven.substeps = best.substeps;
     log(&best, "first");
     Ok(best)
 }
 
 /// The fit of the first segments from one starting point; `None` if no segment can be integrated.
 fn fit_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) -> Option<Fitted> {
-    problem.course.substeps = 1;
+    problem.driven.substeps = 1;
     problem.project_starts(&x, &mut segments);
     choose_steps(problem, &x, &segments);
     let integrated = problem.all(&x, &segments);
@@ -122,7 +122,7 @@ fn fit_from(problem: &mut Problem<'_>, x: Vec<f64>, mut segments: Vec<Segment>) 
     if segments.is_empty() {
         return None;
     }
-    problem.settle(&x, &mut segments, START_ROUNDS);
+    problem.fit_starts(&x, &mut segments, START_ROUNDS);
     let mut fitted = Fitted { x, segments, normal: Normal::default(), substeps: 1 };
     refit(problem, &mut fitted, ITERATIONS);
     if choose_steps(problem, &fitted.x, &fitted.segments) {

@@ -1,6 +1,6 @@
 //! A fit of constants and initial states, how well it determines them, and its repetition.
 
-use super::course::Segment;
+use super::driven::Segment;
 use super::solve::{Normal, Problem};
 use super::thresholds::{LEAST_ERROR_DECREASE, LEAST_SCATTERED_SEGMENTS, MOST_OVER_NOISE, SCATTER_ERRORS};
 
@@ -71,7 +71,7 @@ impl Fitted {
 
 /// Fits the constants and the initial states again.
 pub(super) fn refit(problem: &Problem<'_>, fitted: &mut Fitted, iterations: usize) {
-    fitted.substeps = problem.course.substeps;
+    fitted.substeps = problem.driven.substeps;
     fitted.normal = problem.fit(&mut fitted.x, &mut fitted.segments, iterations);
 }
 

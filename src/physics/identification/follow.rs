@@ -1,7 +1,7 @@
 //! Integrates many segments side by side, with derivatives by initial states and constants. Each segment is a lane of a batch.
 
 use super::closed::Closed;
-use super::course::{Course, Segment, forces};
+use super::driven::{DrivenEquations, Segment, forces};
 use super::lanes::State;
 use crate::linalg::{self, Workspace};
 use crate::recording::RecordedTrajectory;
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// Evaluates and integrates the equations of motion of many states side by side, with reused buffers.
 pub(super) struct Follower<'a> {
-    course: &'a Course<'a>,
+    driven: &'a DrivenEquations<'a>,
     motion: Replay<f64>,
     slopes: Replay<f64>,
     workspace: Workspace<f64>,
@@ -28,10 +28,10 @@ pub(super) struct Follower<'a> {
 }
 
 impl<'a> Follower<'a> {
-    pub fn new(course: &'a Course<'a>) -> Self {
-        let equations = course.equations;
+    pub fn new(driven: &'a DrivenEquations<'a>) -> Self {
+        let equations = driven.equations;
         Self {
-            course,
+            driven,
             motion: Replay::new(Arc::clone(&equations.motion)),
             slopes: Replay::new(Arc::clone(&equations.slopes)),
             workspace: Workspace::new(),
@@ -48,21 +48,21 @@ impl<'a> Follower<'a> {
 
     /// Sets trajectories and times of the states that are evaluated next. If they are not set, the states are spread over the recording.
     pub fn at(&mut self, places: impl Iterator<Item = (usize, f64)>) {
-        let (course, count) = (self.course, self.course.equations.known);
+        let (driven, count) = (self.driven, self.driven.equations.known);
         if count > 0 {
             self.known.clear();
             for (lane, (track, t)) in places.enumerate() {
                 self.known.resize((lane + 1) * count, 0.0);
-                course.known(track, t, &mut self.known[lane * count..]);
+                driven.known(track, t, &mut self.known[lane * count..]);
             }
         }
     }
 
     /// Spreads the states over the recording if their times are not set.
     fn spread_times(&mut self, lanes: usize) {
-        let (course, count) = (self.course, self.course.equations.known);
+        let (driven, count) = (self.driven, self.driven.equations.known);
         if self.known.len() != lanes * count {
-            let tracks = course.recording.tracks.iter().enumerate();
+            let tracks = driven.recording.tracks.iter().enumerate();
             let samples: Vec<(usize, f64)> =
                 tracks.flat_map(|(k, track)| track.times.iter().map(move |t| (k, *t))).collect();
             self.at((0..lanes).map(|lane| samples[(2 * lane + 1) * samples.len() / (2 * lanes)]));
@@ -81,7 +81,7 @@ impl<'a> Follower<'a> {
 
     /// Number of constraints.
     pub fn constraints(&self) -> usize {
-        self.course.equations.rows.as_ref().map_or(0, |rows| rows.names.len())
+        self.driven.equations.rows.as_ref().map_or(0, |rows| rows.names.len())
     }
 
     /// Accelerations by a unit force on each coordinate at the states evaluated last, `(lanes, n, n)`; without constraints, the inverse of the mass
@@ -91,20 +91,20 @@ impl<'a> Follower<'a> {
             return closed.mobility();
         }
         let mut inverse = vec![0.0; self.mass.len()];
-        let _ = linalg::inverse(self.course.equations.n, &self.mass, &mut inverse, &mut Workspace::new());
+        let _ = linalg::inverse(self.driven.equations.n, &self.mass, &mut inverse, &mut Workspace::new());
         inverse
     }
 
     /// Accelerations of states under forces, `(lanes, n)` each; `force` may be empty. `NaN` if the equations have no solution.
     pub fn accelerate(&mut self, values: &[f64], (q, v): (&[f64], &[f64]), force: &[f64], a: &mut [f64]) {
-        let n = self.course.equations.n;
+        let n = self.driven.equations.n;
         let lanes = q.len() / n;
         self.mass.resize(lanes * n * n, 0.0);
         self.rest.resize(lanes * n, 0.0);
         // Shapes are those of the recorded program.
         self.spread_times(lanes);
         let inputs: [&[f64]; 3] = [q, v, &self.known];
-        let inputs = &inputs[..2 + usize::from(self.course.equations.known > 0)];
+        let inputs = &inputs[..2 + usize::from(self.driven.equations.known > 0)];
         let _ = self.motion.evaluate(lanes, inputs, values, &mut [&mut self.mass, &mut self.rest]);
         if !force.is_empty() {
             self.rest.iter_mut().zip(force).for_each(|(rest, force)| *rest += force);
@@ -121,26 +121,26 @@ impl<'a> Follower<'a> {
 
     /// The force residuals `Q + h - M a` at the states evaluated last, `(lanes, n)`: forces minus mass times acceleration.
     pub fn unbalanced_forces(&self, a: &[f64], into: &mut [f64]) {
-        let n = self.course.equations.n;
+        let n = self.driven.equations.n;
         let rows = self.mass.chunks_exact(n).zip(&self.rest).zip(into).enumerate();
         rows.for_each(|(at, ((row, rest), into))| *into = rest - linalg::dot(row, &a[at / n * n..][..n]));
     }
 
     /// Derivatives of `M a - h - Q` by positions, velocities and constants, with the accelerations held fixed: `(lanes, n, 2n + chosen)`.
     pub fn force_slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
-        let n = self.course.equations.n;
-        self.by_state.resize(q.len() * (2 * n + self.course.chosen), 0.0);
+        let n = self.driven.equations.n;
+        self.by_state.resize(q.len() * (2 * n + self.driven.chosen), 0.0);
         self.spread_times(q.len() / n);
         let inputs: [&[f64]; 4] = [q, v, a, &self.known];
-        let inputs = &inputs[..3 + usize::from(self.course.equations.known > 0)];
+        let inputs = &inputs[..3 + usize::from(self.driven.equations.known > 0)];
         let _ = self.slopes.evaluate(q.len() / n, inputs, values, &mut [&mut self.by_state]);
         &self.by_state
     }
 
     /// Derivatives of the accelerations found last by positions, velocities and constants: `(lanes, n, 2n + chosen)`.
     pub fn slopes(&mut self, values: &[f64], (q, v, a): (&[f64], &[f64], &[f64])) -> &[f64] {
-        let n = self.course.equations.n;
-        let (lanes, width) = (q.len() / n, 2 * n + self.course.chosen);
+        let n = self.driven.equations.n;
+        let (lanes, width) = (q.len() / n, 2 * n + self.driven.chosen);
         self.force_slopes(values, (q, v, a));
         let closed = self.closed.as_mut().map(|closed| closed.slopes(values, [q, v, a], &self.by_state));
         let matrices = closed.map_or(&self.mass[..], |(_, matrices)| matrices);
@@ -170,7 +170,7 @@ impl<'a> Follower<'a> {
 
     /// The rate of change of a state and of its derivatives.
     fn rate(&mut self, values: &[f64], at: &State, columns: usize, rate: &mut State) {
-        let n = self.course.equations.n;
+        let n = self.driven.equations.n;
         let force = std::mem::take(&mut self.force);
         self.accelerate(values, (&at.q, &at.v), &force, &mut rate.v);
         self.force = force;
@@ -179,7 +179,7 @@ impl<'a> Follower<'a> {
             return;
         }
         rate.q_slopes.copy_from_slice(&at.v_slopes);
-        let (width, starts) = (2 * n + self.course.chosen, columns - self.course.chosen);
+        let (width, starts) = (2 * n + self.driven.chosen, columns - self.driven.chosen);
         let a = std::mem::take(&mut rate.v);
         let slopes = self.slopes(values, (&at.q, &at.v, &a));
         rate.v_slopes.fill(0.0);
@@ -208,24 +208,24 @@ impl<'a> Follower<'a> {
         derivatives: bool,
         mut visit: impl FnMut(&mut Self, usize, &State),
     ) {
-        let course = self.course;
-        let (n, lanes) = (course.equations.n, segments.len());
-        let columns = if derivatives { course.starts() + course.chosen } else { 0 };
+        let driven = self.driven;
+        let (n, lanes) = (driven.equations.n, segments.len());
+        let columns = if derivatives { driven.starts() + driven.chosen } else { 0 };
         let mut now = State::sized(lanes, n, columns);
         for (lane, segment) in segments.iter().enumerate() {
             now.q[lane * n..(lane + 1) * n].copy_from_slice(&segment.start[..n]);
             now.v[lane * n..(lane + 1) * n].copy_from_slice(&segment.start[n..]);
-            for i in (0..n).filter(|_| derivatives && course.equations.rows.is_none()) {
+            for i in (0..n).filter(|_| derivatives && driven.equations.rows.is_none()) {
                 now.q_slopes[(lane * n + i) * columns + i] = 1.0;
                 now.v_slopes[(lane * n + i) * columns + n + i] = 1.0;
             }
         }
         if derivatives {
-            now.begin_within(n, columns, &course.tangents(values, segments));
+            now.begin_within(n, columns, &driven.tangents(values, segments));
         }
         let mut scratch = Scratch::like(&now);
         let longest = segments.iter().map(|segment| segment.samples).max().unwrap_or(0);
-        let track = |segment: &Segment| -> &RecordedTrajectory { &course.recording.tracks[segment.track] };
+        let track = |segment: &Segment| -> &RecordedTrajectory { &driven.recording.tracks[segment.track] };
         let forced = segments.iter().any(|segment| !track(segment).force.is_empty());
         self.force = vec![0.0; if forced { lanes * n } else { 0 }];
         let ends = |segment: &&Segment, sample: usize| {
@@ -243,18 +243,18 @@ impl<'a> Follower<'a> {
             let intervals: Vec<f64> = segments.iter().map(interval).collect();
             let most = intervals.iter().copied().fold(0.0, f64::max);
             // The number of steps across a gap grows with its length.
-            let steps = ((course.substeps as f64 * most / course.step - 0.5).ceil() as usize).max(course.substeps);
+            let steps = ((driven.substeps as f64 * most / driven.step - 0.5).ceil() as usize).max(driven.substeps);
             let h: Vec<f64> = intervals.iter().map(|interval| interval / steps as f64).collect();
             for step in 0..steps {
                 self.advance((values, columns), (&h, &mut now), &mut scratch, |share, force, known| {
                     let x = (step as f64 + share) / steps as f64;
-                    for (segment, known) in segments.iter().zip(known.chunks_exact_mut(course.equations.known.max(1))) {
+                    for (segment, known) in segments.iter().zip(known.chunks_exact_mut(driven.equations.known.max(1))) {
                         let (before, after) = ends(segment, sample);
-                        course.known(segment.track, before + x * (after - before), known);
+                        driven.known(segment.track, before + x * (after - before), known);
                     }
                     for (segment, into) in segments.iter().zip(force.chunks_exact_mut(n)) {
                         let at = segment.first + sample.min(segment.samples - 1);
-                        forces(track(segment), course.between, (at, x), into);
+                        forces(track(segment), driven.between, (at, x), into);
                     }
                 });
             }
@@ -271,7 +271,7 @@ impl<'a> Follower<'a> {
         Scratch { stage, rates }: &mut Scratch,
         push: impl Fn(f64, &mut [f64], &mut [f64]),
     ) {
-        let n = self.course.equations.n;
+        let n = self.driven.equations.n;
         let widths = [n, n * columns];
         let part = |part: f64| h.iter().map(|h| h * part).collect::<Vec<f64>>();
         let half = part(0.5);
@@ -304,12 +304,12 @@ impl<'a> Follower<'a> {
         late: &mut State,
     ) {
         late.clone_from(state);
-        let course = self.course;
-        let n = course.equations.n;
+        let driven = self.driven;
+        let n = driven.equations.n;
         let columns = state.q_slopes.len() / state.q.len().max(1);
         let mut scratch = Scratch::like(state);
         let tracks: Vec<&RecordedTrajectory> =
-            segments.iter().map(|segment| &course.recording.tracks[segment.track]).collect();
+            segments.iter().map(|segment| &driven.recording.tracks[segment.track]).collect();
         let of = |(segment, track): (&&Segment, &&RecordedTrajectory)| match sample < segment.samples {
             true => (track.times[segment.first + sample], by),
             false => (track.times[segment.first], 0.0),
@@ -328,13 +328,13 @@ impl<'a> Follower<'a> {
             };
             let intervals: Vec<(usize, f64, f64)> = places.iter().zip(&tracks).map(interval).collect();
             let most = intervals.iter().fold(0.0, |most: f64, interval| most.max(interval.1.abs()));
-            let steps = (course.substeps as f64 * most / course.step).ceil().max(1.0);
+            let steps = (driven.substeps as f64 * most / driven.step).ceil().max(1.0);
             let h: Vec<f64> = intervals.iter().map(|interval| interval.1 / steps).collect();
             for step in 0..steps as usize {
                 self.advance((values, columns), (&h, late), &mut scratch, |share, force, known| {
-                    for (lane, known) in known.chunks_exact_mut(course.equations.known.max(1)).enumerate() {
+                    for (lane, known) in known.chunks_exact_mut(driven.equations.known.max(1)).enumerate() {
                         let now = places[lane].0 + (step as f64 + share) * h[lane];
-                        course.known(segments[lane].track, now, known);
+                        driven.known(segments[lane].track, now, known);
                     }
                     for (lane, into) in force.chunks_exact_mut(n).enumerate() {
                         let (track, end) = (tracks[lane], intervals[lane].0.min(tracks[lane].len() - 1));
@@ -342,7 +342,7 @@ impl<'a> Follower<'a> {
                         let now = places[lane].0 + (step as f64 + share) * h[lane];
                         let length = track.times[end] - before;
                         let x = if length > 0.0 { (now - before) / length } else { 0.0 };
-                        forces(track, course.between, (end, x), into);
+                        forces(track, driven.between, (end, x), into);
                     }
                 });
             }

@@ -1,7 +1,7 @@
 //! The result of an identification.
 
 use super::by_trajectory::ByTrajectory;
-use super::course::Segment;
+use super::driven::Segment;
 use super::thresholds::NEAR_DECREMENT;
 use super::{Between, Verdict};
 use crate::lagrangian::SystemInstance;
@@ -62,7 +62,7 @@ pub struct Undetermined {
     /// Describes what is not determined.
     pub text: String,
     /// Advice on how to determine it.
-    pub cure: String,
+    pub advice: String,
 }
 
 /// A sum, or a product of powers, that is determined although its constants are not, such as a base parameter of a robot.

@@ -2,8 +2,8 @@
 //! beginning of a trajectory, with the constants at their starting values. From the best of them, the constants are fitted too, to a part of the
 //! recording that doubles as long as the model fits. The rest of the recording is divided into segments that continue this motion.
 
-use super::course::Segment;
-use super::cure::{POSITION, VELOCITY, spread};
+use super::advice::{POSITION, VELOCITY, spread};
+use super::driven::Segment;
 use super::fitted::{Fitted, refit};
 use super::pieces::Pieces;
 use super::solve::{Normal, Problem};
@@ -43,8 +43,8 @@ impl Measured {
 impl Search<'_, '_> {
     /// The best fit of all segments from given constants.
     pub fn first(&mut self, given: &[f64]) -> Result<Fitted, IdentifyError> {
-        self.problem.course.substeps = 1;
-        let samples = |track: usize| self.problem.course.recording.tracks[track].len();
+        self.problem.driven.substeps = 1;
+        let samples = |track: usize| self.problem.driven.recording.tracks[track].len();
         let longest = self.layout.iter().map(|segment| segment.track).max_by_key(|track| samples(*track));
         if self.layout.is_empty() {
             return Err(IdentifyError::Lost);
@@ -100,7 +100,7 @@ impl Search<'_, '_> {
         for (units, most) in [(1, PROMISING_STARTS), (2, CONTINUED_STARTS)] {
             let samples = self.samples(at, units);
             tried.iter_mut().for_each(|tried| tried.samples = samples);
-            self.problem.settle(x, &mut tried, SEARCH_ROUNDS);
+            self.problem.fit_starts(x, &mut tried, SEARCH_ROUNDS);
             tried = self.ranked(x, tried, most);
         }
         choose_steps(self.problem, x, &tried);
@@ -124,7 +124,7 @@ impl Search<'_, '_> {
         loop {
             units = units.min(self.adjacent(0));
             segments[0].samples = self.samples(0, units);
-            self.problem.settle(&x, &mut segments, SEARCH_ROUNDS);
+            self.problem.fit_starts(&x, &mut segments, SEARCH_ROUNDS);
             choose_steps(self.problem, &x, &segments);
             let mut tried = Fitted { x, segments, normal: Normal::default(), substeps: 1 };
             refit(self.problem, &mut tried, ITERATIONS);
@@ -193,7 +193,7 @@ impl Search<'_, '_> {
     /// A segment with its initial state fitted, and its mean square; `None` if it cannot be integrated.
     fn with_fitted_start(&self, x: &[f64], segment: Segment) -> Option<(Segment, f64)> {
         let mut segments = [segment];
-        self.problem.settle(x, &mut segments, SEARCH_ROUNDS);
+        self.problem.fit_starts(x, &mut segments, SEARCH_ROUNDS);
         let linear = self.problem.all(x, &segments).pop()??;
         let [segment] = segments;
         Some((segment, linear.square / linear.count.max(1.0)))

@@ -7,8 +7,8 @@
 //! that least squares on its output are generalized least squares (Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, 1989,
 //! sections 3.4 and 7.3).
 
-use super::course::Segment;
 use super::covariance::Root;
+use super::driven::Segment;
 use super::linear::{inverses, part};
 use super::solve::{Linear, Problem};
 use super::thresholds::{
@@ -84,11 +84,11 @@ impl Problem<'_> {
     /// The noise of the positions is a nuisance parameter, profiled out of the likelihood: its variance is the mean square innovation. Initial
     /// states count as unknown, because fitted ones absorb much of the effect of the forces (Patterson and Thompson, Biometrika 58 (1971) 545).
     pub(super) fn estimate_force_noise(&mut self, x: &[f64], segments: &[Segment]) -> bool {
-        let recording = self.course.recording;
+        let recording = self.driven.recording;
         let forced = recording.tracks.iter().filter(|track| !track.force.is_empty());
         let signals = forced.map(|track| (track.times.as_slice(), track.force.as_slice()));
         let shown: Vec<f64> =
-            (0..self.course.equations.n).map(|i| noise(signals.clone(), self.sigma.len(), i).sigma).collect();
+            (0..self.driven.equations.n).map(|i| noise(signals.clone(), self.sigma.len(), i).sigma).collect();
         let stride = segments.len().div_ceil(LANES).max(1);
         let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
         probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
@@ -135,18 +135,18 @@ impl Problem<'_> {
 
     /// Filters for the segments of all lanes, with rows of `width` derivatives; none if residuals are independent.
     pub(super) fn filters(&self, lanes: usize, width: usize) -> Vec<Filter> {
-        let n = self.course.equations.n;
+        let n = self.driven.equations.n;
         let Disturbances { force, unknown_start, start_variances } = &self.disturbances;
         if force.is_empty() && unknown_start.is_none() {
             return Vec::new();
         }
-        let (starts, closed) = (self.course.starts(), self.course.equations.rows.as_ref());
+        let (starts, closed) = (self.driven.starts(), self.driven.equations.rows.as_ref());
         // Changes of positions come first.
         let positions = closed.map_or(n, |rows| n - rows.holonomic());
         let most = self.sigma.iter().copied().fold(0.0, f64::max);
         let mut variance = vec![0.0; starts * starts];
         for k in (0..starts).filter(|_| unknown_start.is_some() && start_variances.is_empty()) {
-            let time = if k < positions { 1.0 } else { self.course.step };
+            let time = if k < positions { 1.0 } else { self.driven.step };
             let sigma = if closed.is_some() { most } else { self.sigma[k % n] };
             variance[k * (starts + 1)] = (UNKNOWN_START * sigma / time).powi(2);
         }
@@ -182,7 +182,7 @@ impl Problem<'_> {
     /// Changes of the initial states that force errors over one interval are equivalent to, `(lanes, n, starts)`. `slopes` are the derivatives of
     /// states by initial states, `(lanes, 2n, starts)`, `mobility` the accelerations by unit forces, `(lanes, n, n)`.
     pub(super) fn impulses(&self, slopes: &[f64], mobility: &[f64], step: f64) -> Vec<f64> {
-        let (n, force, starts) = (self.course.equations.n, &self.disturbances.force, self.course.starts());
+        let (n, force, starts) = (self.driven.equations.n, &self.disturbances.force, self.driven.starts());
         // Lanes that fail are NaN, and their segments fail.
         let back = if starts == 2 * n { inverses(starts, slopes) } else { left_inverses(starts, slopes, 2 * n) };
         let mut impulses = vec![0.0; slopes.len() / 2];

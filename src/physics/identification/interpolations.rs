@@ -28,12 +28,12 @@ pub(super) fn best_interpolation(problem: &mut Problem<'_>, fitted: Fitted, riva
         return (fitted, Rivals::default());
     }
     let mut best = 0;
-    let first = problem.course.between;
+    let first = problem.driven.between;
     let mut tried = vec![(first, fitted)];
     for between in rivals.interpolations.iter().copied().filter(|other| *other != first) {
-        problem.course.between = between;
+        problem.driven.between = between;
         let mut own = tried[best].1.clone();
-        problem.settle(&own.x, &mut own.segments, FEW_START_ROUNDS);
+        problem.fit_starts(&own.x, &mut own.segments, FEW_START_ROUNDS);
         refit(problem, &mut own, ITERATIONS);
         tracing::debug!(?between, square = own.normal.square, "forces");
         if own.normal.square < tried[best].1.normal.square {
@@ -42,7 +42,7 @@ pub(super) fn best_interpolation(problem: &mut Problem<'_>, fitted: Fitted, riva
         tried.push((between, own));
     }
     let (between, fitted) = tried.swap_remove(best);
-    problem.course.between = between;
+    problem.driven.between = between;
     let limit =
         fitted.normal.square + EQUAL_FIT_INCREASE * (fitted.normal.square / fitted.normal.count.max(1.0)).max(1.0);
     let mut rivals = Rivals { interpolations: vec![between], largest_change: vec![0.0; fitted.x.len()] };

@@ -4,7 +4,7 @@
 //! `A = a_q Q + a_v V + a_p` follows from the equations of motion.
 
 use super::IdentifyError;
-use super::course::{Course, Segment};
+use super::driven::{DrivenEquations, Segment};
 use super::follow::Follower;
 use super::lanes::State;
 use super::solve::Problem;
@@ -133,18 +133,18 @@ impl<'a> ReadingSlopes<'a> {
     /// Computes the readings of all lanes at a sample of their segments, with derivatives if the states have derivatives.
     pub fn evaluate(
         &mut self,
-        (follower, course): (&mut Follower<'_>, &Course<'_>),
+        (follower, driven): (&mut Follower<'_>, &DrivenEquations<'_>),
         values: &[f64],
         (segments, sample): (&[&Segment], usize),
         state: &State,
     ) {
         let Measured { known, accelerated, .. } = *self.measured;
-        let (n, m, lanes) = (course.equations.n, self.measured.count(), segments.len());
-        let width = 3 * n + course.chosen;
+        let (n, m, lanes) = (driven.equations.n, self.measured.count(), segments.len());
+        let width = 3 * n + driven.chosen;
         self.known.resize(lanes * known, 0.0);
         for (segment, into) in segments.iter().zip(self.known.chunks_exact_mut(known)) {
             let at = segment.first + sample.min(segment.samples - 1);
-            course.known(segment.track, course.recording.tracks[segment.track].times[at], into);
+            driven.known(segment.track, driven.recording.tracks[segment.track].times[at], into);
         }
         self.a.resize(lanes * n, 0.0);
         if accelerated {
@@ -163,7 +163,7 @@ impl<'a> ReadingSlopes<'a> {
         }
         if accelerated {
             let slopes = follower.slopes(values, (&state.q, &state.v, &self.a));
-            through_accelerations((n, m, course.chosen), &mut self.by_state, slopes);
+            through_accelerations((n, m, driven.chosen), &mut self.by_state, slopes);
         }
         self.chain((n, m, columns), state);
     }
@@ -211,10 +211,10 @@ impl Problem<'_> {
         let (m, values) = (measured.count(), self.parameters(x));
         let mut found = vec![vec![f64::NAN; m]; segments.len()];
         let mut reader = ReadingSlopes::new(measured);
-        Follower::new(&self.course).follow(&values, segments, false, |follower, sample, state| {
+        Follower::new(&self.driven).follow(&values, segments, false, |follower, sample, state| {
             let is_last = |segment: &Segment| sample + 1 == segment.samples;
             if segments.iter().any(|segment| is_last(segment)) {
-                reader.evaluate((follower, &self.course), &values, (segments, sample), state);
+                reader.evaluate((follower, &self.driven), &values, (segments, sample), state);
                 let lanes = segments.iter().zip(&mut found).zip(reader.readings.chunks_exact(m));
                 lanes
                     .filter(|((segment, _), _)| is_last(segment))
@@ -255,7 +255,7 @@ mod tests {
         let track = RecordedTrajectory { name: "log".into(), q: vec![0.0; 3 * times.len()], times, v, a, force };
         let coordinates = instance.measured().map(str::to_string).collect();
         let recording = Recording { coordinates, periodic: vec![false; 3], tracks: vec![track] };
-        let course = Course {
+        let driven = DrivenEquations {
             recording: &recording,
             equations: &equations,
             chosen: chosen.len(),
@@ -266,8 +266,8 @@ mod tests {
         };
         let segment = Segment { track: 0, first: 0, samples: 9, start: start.to_vec() };
         let mut reader = ReadingSlopes::new(&measured);
-        Follower::new(&course).follow(&instance.parameters, &[&segment], true, |follower, sample, state| {
-            reader.evaluate((follower, &course), &instance.parameters, (&[&segment], sample), state);
+        Follower::new(&driven).follow(&instance.parameters, &[&segment], true, |follower, sample, state| {
+            reader.evaluate((follower, &driven), &instance.parameters, (&[&segment], sample), state);
         });
         (reader.readings, reader.slopes)
     }

@@ -25,6 +25,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod advice;
 mod averages;
 mod bodies;
 mod bootstrap;
@@ -34,11 +35,10 @@ mod choices;
 mod closed;
 #[cfg(test)]
 mod closed_tests;
-mod course;
 mod covariance;
-mod cure;
 mod descent;
 mod determined;
+mod driven;
 mod error;
 mod first_fit;
 mod fitted;
@@ -75,7 +75,7 @@ mod unknowns;
 mod verdict;
 
 pub use by_trajectory::{ByTrajectory, OfTrajectory, Scatter};
-pub(crate) use course::{Course, Segment};
+pub(crate) use driven::{DrivenEquations, Segment};
 pub use error::IdentifyError;
 pub use found::{
     Bodies, Combination, Constant, Correlations, Identified, Outlier, Residual, ResidualPath, SensorConstant,

@@ -1,7 +1,7 @@
 //! The result of a fit to motion: residuals, verdict and standard errors.
 
-use super::course::Segment;
 use super::covariance::{Root, Weighting, agreement, continuation, long_run, scores};
+use super::driven::Segment;
 use super::fitted::Fitted;
 use super::found::{Identified, Residual, ResidualPath};
 use super::quality::{
@@ -25,7 +25,7 @@ pub(super) fn result(
     (start, noise): (&[f64], &[f64]),
     known: bool,
 ) -> Identified {
-    let recording = problem.course.recording;
+    let recording = problem.driven.recording;
     let normal_at = |x: &[f64]| Some(problem.normal_at(x, &fitted.segments));
     let fit = FitResiduals::of(problem, fitted);
     let by_coordinate = fit.by_coordinate(problem, noise);
@@ -52,14 +52,14 @@ pub(super) fn result(
         segments: fitted.segments.len(),
         segment_seconds: typical_seconds(problem, &fitted.segments),
         substeps: fitted.substeps,
-        between: forced.then_some(problem.course.between),
+        between: forced.then_some(problem.driven.between),
         ..unknowns(instance, problem, &at_bounds, (start, 1.0), (Quantity::Accelerations, &normal_at))
     }
 }
 
 /// Length of a typical segment in s.
 fn typical_seconds(problem: &Problem<'_>, segments: &[Segment]) -> f64 {
-    typical_samples(segments) as f64 * problem.course.step
+    typical_samples(segments) as f64 * problem.driven.step
 }
 
 /// Residuals of a fit and their statistics.
@@ -97,7 +97,7 @@ impl FitResiduals {
         let of = |i: usize| {
             let own = self.residuals.iter().flat_map(|segment| segment.iter().skip(i).step_by(n).copied());
             let rms = rms(own.filter(|r| r.is_finite())) / self.freedom.sqrt() * problem.sigma[i];
-            let (coordinate, spread) = (problem.course.recording.coordinates[i].clone(), problem.spread[i]);
+            let (coordinate, spread) = (problem.driven.recording.coordinates[i].clone(), problem.spread[i]);
             let (autocorrelation, white) = (self.correlations[i].at_lag_one, self.is_white(&self.correlations[i]));
             Residual { coordinate, rms, noise: noise[i], spread, autocorrelation, white }
         };
@@ -140,7 +140,7 @@ impl FitResiduals {
 fn paths(problem: &Problem<'_>, segments: &[Segment], residuals: &[Vec<f64>]) -> Vec<ResidualPath> {
     let of = |(segment, residuals): (&Segment, &Vec<f64>)| {
         let noise = |sample: usize, i: usize| problem.sigma_at(segment.track, sample, i);
-        ResidualPath::of(problem.course.recording, segment, residuals, noise)
+        ResidualPath::of(problem.driven.recording, segment, residuals, noise)
     };
     segments.iter().zip(residuals).map(of).collect()
 }

@@ -2,7 +2,7 @@
 //!
 //! Smoothing does not bridge a long gap, but the integration does: pieces matter only at the beginning of the search.
 
-use super::course::Segment;
+use super::driven::Segment;
 use super::segments::thinned;
 use super::thresholds::{LEAST_SAMPLES, LEAST_SEGMENT, LEAST_SMOOTHED_SAMPLES, LEAST_TRACK, POLYNOMIAL_RIDGE};
 use super::{IdentifyError, IdentifyOptions};

@@ -1,6 +1,6 @@
 //! Tests of the residuals: whether they are consistent with the noise, and which samples are outliers.
 
-use super::course::Segment;
+use super::driven::Segment;
 use super::found::{Outlier, Residual};
 use super::innovations::Disturbances;
 use super::solve::{Problem, batches};

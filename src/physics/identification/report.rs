@@ -11,8 +11,8 @@ impl Identified {
         let mut findings = Findings::default();
         findings.lines(&self.obstacles);
         self.add_constants(&mut findings);
-        for Undetermined { text, cure, .. } in &self.undetermined {
-            findings.gap().line(text).line(format!("  advice: {cure}"));
+        for Undetermined { text, advice, .. } in &self.undetermined {
+            findings.gap().line(text).line(format!("  advice: {advice}"));
         }
         if let Some(text) = self.bodies.as_ref().and_then(Bodies::text) {
             findings.gap().line(text);

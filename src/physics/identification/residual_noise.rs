@@ -9,7 +9,7 @@ use crate::recording::rms;
 
 /// Replaces the noise of every coordinate by the size of its residuals, for each trajectory separately if trajectories differ significantly.
 pub(super) fn update_noise(problem: &mut Problem<'_>, fitted: &Fitted) {
-    let (n, tracks) = (problem.sigma.len(), problem.course.recording.tracks.len());
+    let (n, tracks) = (problem.sigma.len(), problem.driven.recording.tracks.len());
     let residuals = problem.all_residuals(&fitted.x, &fitted.segments);
     let freedom = fitted.normal.count / problem.readings(&fitted.segments);
     // Residuals in the units of the coordinates, `(tracks, n)`.

@@ -96,7 +96,7 @@ fn a_search_that_is_cut_short_does_not_report_convergence() {
     let form = damped(40.0, 0.05);
     let recording = recorded(&damped(2.0, 8.0), &[&[1.3, 0.2]], (4.0, 0.02), &[1e-3], 1);
     let equations = crate::lagrangian::Equations::record(&form, &[1, 2], &[]).unwrap().unwrap();
-    let course = Course {
+    let driven = DrivenEquations {
         recording: &recording,
         equations: &equations,
         chosen: 2,
@@ -106,7 +106,7 @@ fn a_search_that_is_cut_short_does_not_report_convergence() {
         substeps: 4,
     };
     let problem = Problem {
-        course,
+        driven,
         values: form.parameters.clone(),
         chosen: vec![1, 2],
         ranges: form.system.parameters.iter().map(|parameter| parameter.range).collect(),

@@ -1,6 +1,6 @@
 //! The lengths of segments: thins them out, and halves or joins them as long as that reduces the standard errors.
 
-use super::course::Segment;
+use super::driven::Segment;
 use super::fitted::{Fitted, log, refit};
 use super::solve::Problem;
 use super::steps::choose_steps;
@@ -67,7 +67,7 @@ pub(super) fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
             break;
         }
         let mut shorter = Fitted { segments, ..fitted.clone() };
-        problem.settle(&shorter.x, &mut shorter.segments, FEW_START_ROUNDS);
+        problem.fit_starts(&shorter.x, &mut shorter.segments, FEW_START_ROUNDS);
         refit(problem, &mut shorter, ITERATIONS);
         log(&shorter, "shorter");
         if shorter.normal.failed > 0 || !shorter.determines_better_than(&fitted) {
@@ -80,7 +80,7 @@ pub(super) fn shortened(problem: &Problem<'_>, mut fitted: Fitted) -> Fitted {
 
 /// Joins adjacent segments as long as that reduces the standard errors, or up to the wanted length.
 pub(super) fn lengthened(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: Option<f64>) -> Fitted {
-    let seconds = |segments: &[Segment]| typical_samples(segments) as f64 * problem.course.step;
+    let seconds = |segments: &[Segment]| typical_samples(segments) as f64 * problem.driven.step;
     let mut too_short = wanted.map(|wanted| seconds(&fitted.segments) * SHORT_OF_CHOSEN < wanted);
     while too_short != Some(false) && !problem.cancellation.is_cancelled() {
         let segments = joined(&fitted.segments);
@@ -90,11 +90,11 @@ pub(super) fn lengthened(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: 
         let mut longer = Fitted { segments, ..fitted.clone() };
         choose_steps(problem, &longer.x, &longer.segments);
         // The largest number of steps may not be enough to integrate longer segments accurately.
-        if wanted.is_none() && problem.course.substeps == MOST_SUBSTEPS && fitted.substeps < MOST_SUBSTEPS {
-            problem.course.substeps = fitted.substeps;
+        if wanted.is_none() && problem.driven.substeps == MOST_SUBSTEPS && fitted.substeps < MOST_SUBSTEPS {
+            problem.driven.substeps = fitted.substeps;
             break;
         }
-        problem.settle(&longer.x, &mut longer.segments, START_ROUNDS);
+        problem.fit_starts(&longer.x, &mut longer.segments, START_ROUNDS);
         refit(problem, &mut longer, ITERATIONS);
         log(&longer, "longer");
         // For chaotic motion the sum of squares is rough, and the search stalls.
@@ -102,11 +102,11 @@ pub(super) fn lengthened(problem: &mut Problem<'_>, mut fitted: Fitted, wanted: 
         let acceptable =
             longer.normal.failed == 0 && longer.mean_square() < MOST_INCREASE * fitted.mean_square() && has_arrived;
         if wanted.is_none() && !(acceptable && longer.determines_better_than(&fitted)) {
-            problem.course.substeps = fitted.substeps;
+            problem.driven.substeps = fitted.substeps;
             break;
         }
         fitted = longer;
-        let seconds = typical_samples(&fitted.segments) as f64 * problem.course.step;
+        let seconds = typical_samples(&fitted.segments) as f64 * problem.driven.step;
         too_short = wanted.map(|wanted| seconds * SHORT_OF_CHOSEN < wanted);
     }
     fitted

@@ -2,7 +2,7 @@
 
 use super::averages::Averages;
 use super::closed::FreePart;
-use super::course::forces;
+use super::driven::forces;
 use super::follow::Follower;
 use super::linear::Products;
 use super::solve::{Normal, Problem};
@@ -47,13 +47,13 @@ pub(super) enum Quantity {
 impl States {
     /// The states at samples with full smoothing windows.
     pub fn new(problem: &Problem<'_>, smoothed: &[Option<Smoothed>]) -> Self {
-        let n = problem.course.equations.n;
+        let n = problem.driven.equations.n;
         let (mut states, mut force) = (Self::default(), vec![0.0; n]);
         let full = |s: &Smoothed| s.interior().filter(|&at| s.is_full(at)).collect::<Vec<_>>();
         let all: usize = smoothed.iter().flatten().map(|s| full(s).len()).sum();
         let stride = all.div_ceil(MOST_SMOOTHED_STATES).max(1);
         states.stride = stride;
-        for (at, (track, smoothed)) in problem.course.recording.tracks.iter().zip(smoothed).enumerate() {
+        for (at, (track, smoothed)) in problem.driven.recording.tracks.iter().zip(smoothed).enumerate() {
             let Some(smoothed) = smoothed else { continue };
             for sample in full(smoothed).into_iter().step_by(stride) {
                 let range = sample * n..(sample + 1) * n;
@@ -65,7 +65,7 @@ impl States {
                 states.a_error.extend(errors.map(|(error, bias)| error.hypot(*bias)));
                 if !track.force.is_empty() {
                     let place = (sample.max(1), if sample == 0 { 0.0 } else { 1.0 });
-                    forces(track, problem.course.between, place, &mut force);
+                    forces(track, problem.driven.between, place, &mut force);
                 }
                 states.force.extend(&force);
             }
@@ -87,7 +87,7 @@ impl States {
     /// The track and the time of a state.
     fn place(&self, problem: &Problem<'_>, at: usize) -> (usize, f64) {
         let (track, sample) = self.places[at];
-        (track, problem.course.recording.tracks[track].times[sample])
+        (track, problem.driven.recording.tracks[track].times[sample])
     }
 
     /// Calls `visit` with every batch of states: the evaluated equations, the range of the batch in the arrays, and its accelerations for constants
@@ -98,9 +98,9 @@ impl States {
         x: &[f64],
         mut visit: impl FnMut(&mut Follower<'_>, Range<usize>, &[f64]),
     ) {
-        let n = problem.course.equations.n;
+        let n = problem.driven.equations.n;
         let values = problem.parameters(x);
-        let mut follower = Follower::new(&problem.course);
+        let mut follower = Follower::new(&problem.driven);
         let mut a = vec![0.0; LANES * n];
         let firsts = (0..self.q.len()).step_by(LANES * n);
         for first in firsts.take_while(|_| problem.cancellation.go_on()) {
@@ -121,8 +121,8 @@ impl States {
         quantity: Quantity,
         mut visit: impl FnMut(usize, &[f64], &[f64]),
     ) {
-        let (n, values) = (problem.course.equations.n, problem.parameters(x));
-        let width = 2 * n + problem.course.chosen;
+        let (n, values) = (problem.driven.equations.n, problem.parameters(x));
+        let width = 2 * n + problem.driven.chosen;
         let (mut residual, mut rows, mut pending) = (Vec::new(), Vec::new(), PendingRows::default());
         // Length of a row: a residual and its derivatives.
         let one = width - 2 * n + 1;
@@ -164,7 +164,7 @@ impl States {
     /// Normal equations with the right-hand sides of batches of states; `None` if no residual is finite.
     pub fn normal(&self, problem: &Problem<'_>, x: &[f64], quantity: Quantity) -> Option<Normal> {
         let m = problem.chosen.len();
-        let mut products = Products::new(problem.course.equations.n, m);
+        let mut products = Products::new(problem.driven.equations.n, m);
         let mut matrix = vec![0.0; m * m];
         let add = |i: usize, row: &[f64], factor: f64| products.add(i, row, factor, &mut matrix);
         let normal = self.right_hand_side(problem, x, quantity, add)?;
@@ -181,7 +181,7 @@ impl States {
         quantity: Quantity,
         mut add: impl FnMut(usize, &[f64], f64),
     ) -> Option<Normal> {
-        let (n, m) = (problem.course.equations.n, problem.chosen.len());
+        let (n, m) = (problem.driven.equations.n, problem.chosen.len());
         let mut normal = Normal { right: vec![0.0; m], held: vec![false; m], ..Normal::default() };
         self.residuals(problem, x, quantity, |first, residuals, slopes| {
             let mut right = vec![0.0; m];
@@ -213,7 +213,7 @@ impl States {
             follower.unbalanced_forces(&self.a[range], found);
             self.with_free_part(follower, |free| free.project_all(found, 1));
         });
-        let (n, mut means) = (problem.course.equations.n, Vec::with_capacity(all.len()));
+        let (n, mut means) = (problem.driven.equations.n, Vec::with_capacity(all.len()));
         let mut averages = Averages::new(self, (n, 1));
         all.chunks_exact(n).for_each(|row| averages.take(row, |mean| means.extend_from_slice(mean)));
         [all, means]
@@ -333,7 +333,7 @@ impl States {
 
     /// The states within the first `share` of the time.
     fn beginning(&self, problem: &Problem<'_>, share: f64) -> Self {
-        let n = problem.course.equations.n;
+        let n = problem.driven.equations.n;
         let [low, high] = self.span(problem);
         let end = low + share * (high - low);
         let kept: Vec<usize> = (0..self.places.len()).filter(|&at| self.place(problem, at).1 <= end).collect();

@@ -2,8 +2,8 @@
 //!
 //! Every segment has an initial state of its own, which is eliminated from the normal equations.
 
-use super::course::{Course, Segment};
 use super::descent::Spectrum;
+use super::driven::{DrivenEquations, Segment};
 use super::follow::Follower;
 use super::innovations::{Disturbances, Filter};
 use super::lanes::State;
@@ -41,7 +41,7 @@ impl Sensor {
 /// Unknowns of the fit other than initial states, and the weights of residuals.
 #[derive(Clone, Debug)]
 pub(crate) struct Problem<'a> {
-    pub course: Course<'a>,
+    pub driven: DrivenEquations<'a>,
     /// Values of all parameters of the system; those of `chosen` are replaced by unknowns.
     pub values: Vec<f64>,
     /// Parameters that are unknown.
@@ -158,7 +158,7 @@ struct Comparison<'a> {
 
 impl<'a> Comparison<'a> {
     fn new(problem: &'a Problem<'a>, x: &[f64], segments: &'a [&'a Segment], derivatives: bool) -> Self {
-        let columns = problem.course.starts() + problem.chosen.len();
+        let columns = problem.driven.starts() + problem.chosen.len();
         let width = columns + problem.sensors.len();
         let filters = problem.filters(segments.len(), width);
         let sensors: Vec<[f64; 3]> = (0..problem.width()).map(|i| problem.sensor(x, i)).collect();
@@ -179,7 +179,7 @@ impl<'a> Comparison<'a> {
             follower.shifted(values, (self.segments, sample), (state, -*delay), late);
         }
         if let Some(reader) = &mut self.reader {
-            reader.evaluate((follower, &self.problem.course), values, (self.segments, sample), state);
+            reader.evaluate((follower, &self.problem.driven), values, (self.segments, sample), state);
         }
     }
 
@@ -188,7 +188,7 @@ impl<'a> Comparison<'a> {
     fn residual(&mut self, (lane, i): (usize, usize), (place, turned): (usize, bool), state: &State) -> f64 {
         let (problem, track) = (self.problem, self.segments[lane].track);
         let (width, columns) = (problem.width(), self.columns);
-        let recording = problem.course.recording;
+        let recording = problem.driven.recording;
         let at = lane * width + i;
         let [offset, gain, delay] = self.sensors[i];
         let late = self.delayed.iter().find(|(known, _)| *known == delay).map_or(state, |(_, late)| late);
@@ -222,9 +222,9 @@ impl<'a> Comparison<'a> {
     /// Adds the disturbance of the known forces over one interval to the filters; `follower` evaluated the states last.
     fn disturb(&mut self, follower: &Follower<'_>, state: &State) {
         let (problem, n) = (self.problem, self.problem.n());
-        let starts = problem.course.starts();
+        let starts = problem.driven.starts();
         let slopes = state.by_starts(n, (starts, self.columns));
-        let impulses = problem.impulses(&slopes, &follower.mobility(), problem.course.step);
+        let impulses = problem.impulses(&slopes, &follower.mobility(), problem.driven.step);
         self.filters.iter_mut().zip(impulses.chunks_exact(n * starts)).for_each(|(filter, own)| filter.disturb(own));
     }
 }
@@ -232,7 +232,7 @@ impl<'a> Comparison<'a> {
 impl Problem<'_> {
     /// Number of coordinates.
     pub(super) fn n(&self) -> usize {
-        self.course.equations.n
+        self.driven.equations.n
     }
 
     /// Number of readings of a sample: positions, or the quantities measured in their place.
@@ -315,7 +315,7 @@ impl Problem<'_> {
         let derivatives = derivatives || !comparison.filters.is_empty();
         let mut a = vec![0.0; segments.len() * n];
         let noisy = !self.disturbances.force.is_empty();
-        Follower::new(&self.course).follow(&values, segments, derivatives, |follower, sample, state| {
+        Follower::new(&self.driven).follow(&values, segments, derivatives, |follower, sample, state| {
             comparison.evaluate(follower, &values, sample, state);
             for (lane, segment) in segments.iter().enumerate().filter(|(_, segment)| sample < segment.samples) {
                 let place = segment.first + sample;
@@ -335,7 +335,7 @@ impl Problem<'_> {
 
     /// Normal equations of a batch of segments; `None` for those that cannot be integrated.
     pub(super) fn batch(&self, x: &[f64], segments: &[&Segment]) -> Vec<Option<Linear>> {
-        let starts = self.course.starts();
+        let starts = self.driven.starts();
         let width = starts + self.unknowns();
         let empty = |segment: &&Segment| Linear {
             matrix: vec![0.0; width * width],
@@ -406,7 +406,7 @@ impl Problem<'_> {
         let n = self.n();
         let values = self.parameters(x);
         let mut ends = vec![vec![f64::NAN; 2 * n]; segments.len()];
-        Follower::new(&self.course).follow(&values, segments, false, |_, sample, state| {
+        Follower::new(&self.driven).follow(&values, segments, false, |_, sample, state| {
             for (lane, _) in segments.iter().enumerate().filter(|(_, segment)| sample + 1 == segment.samples) {
                 ends[lane][..n].copy_from_slice(&state.q[lane * n..(lane + 1) * n]);
                 ends[lane][n..].copy_from_slice(&state.v[lane * n..(lane + 1) * n]);
@@ -418,7 +418,7 @@ impl Problem<'_> {
     /// The normal equations after eliminating the initial states.
     pub fn normal(&self, found: &[Option<Linear>], segments: &[Segment]) -> Normal {
         let m = self.unknowns();
-        let starts = self.course.starts();
+        let starts = self.driven.starts();
         let width = starts + m;
         let mut normal = Normal::empty(m);
         for (linear, segment) in found.iter().zip(segments) {
@@ -458,7 +458,7 @@ impl Problem<'_> {
 
     /// Inverse of the block of the initial state, damped by a share of its diagonal.
     pub(super) fn start_inverse(&self, linear: &Linear, damping: f64) -> Vec<f64> {
-        let starts = self.course.starts();
+        let starts = self.driven.starts();
         let width = starts + self.unknowns();
         let own = (0..starts * starts).map(|at| {
             let x = linear.matrix[at / starts * width + at % starts];
@@ -471,7 +471,7 @@ impl Problem<'_> {
     /// Undamped normal equations at other unknowns, with the initial states of the segments fitted to them.
     pub fn normal_at(&self, x: &[f64], segments: &[Segment]) -> Normal {
         let mut segments = segments.to_vec();
-        self.settle(x, &mut segments, START_ROUNDS);
+        self.fit_starts(x, &mut segments, START_ROUNDS);
         self.normal(&self.all(x, &segments), &segments)
     }
 }

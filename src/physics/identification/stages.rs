@@ -2,7 +2,7 @@
 
 use super::by_trajectory::by_trajectory;
 use super::choices::{check_errors, chosen, fitted_quantity, inputs, missing, sensors};
-use super::course::Course;
+use super::driven::DrivenEquations;
 use super::first_fit::first_fit;
 use super::fitted::{Fitted, refit};
 use super::found::Identified;
@@ -79,7 +79,7 @@ fn identify_together(
     let pieces = Pieces::new(recording, filled.as_ref(), options)?;
     let spread: Vec<f64> = (0..n).map(|i| spread_of(recording, i)).collect();
     let setup = Setup { instance, options, recording, pieces: &pieces, spread: &spread, notes };
-    let course = Course {
+    let driven = DrivenEquations {
         recording,
         equations: &equations,
         chosen: chosen.len(),
@@ -88,7 +88,7 @@ fn identify_together(
         step: pieces.step,
         substeps: 1,
     };
-    let problem = setup.problem(course, (chosen, sensors), measured.as_ref());
+    let problem = setup.problem(driven, (chosen, sensors), measured.as_ref());
     stop.check()?;
     let on_pieces = setup.on_pieces(&problem);
     let found = match quantity {
@@ -114,13 +114,13 @@ impl<'a> Setup<'a> {
     /// The problem of the whole recording.
     fn problem(
         &self,
-        course: Course<'a>,
+        driven: DrivenEquations<'a>,
         (chosen, sensors): (Vec<usize>, Vec<Sensor>),
         measured: Option<&'a Measured>,
     ) -> Problem<'a> {
         let Self { instance, options, pieces, spread, .. } = *self;
         Problem {
-            course,
+            driven,
             values: instance.parameters.clone(),
             ranges: instance.system.parameters.iter().map(|parameter| parameter.range).collect(),
             chosen,
@@ -145,10 +145,10 @@ impl<'a> Setup<'a> {
         'a: 'b,
     {
         let pieces = self.pieces;
-        let of_piece = |track: usize| problem.course.inputs.get(pieces.origin(track, 0).0).copied();
+        let of_piece = |track: usize| problem.driven.inputs.get(pieces.origin(track, 0).0).copied();
         let inputs = (0..pieces.long.tracks.len()).filter_map(of_piece).collect();
-        let course = Course { recording: &pieces.long, inputs, ..problem.course.clone() };
-        Problem { course, missing: &[], ..problem.clone() }
+        let driven = DrivenEquations { recording: &pieces.long, inputs, ..problem.driven.clone() };
+        Problem { driven, missing: &[], ..problem.clone() }
     }
 
     /// `true` if the noise of the positions is given.
@@ -215,7 +215,7 @@ impl<'a> Setup<'a> {
             (found.explained, found.verdict) = (false, Verdict::Uninformative { coordinate, share: 1.0 });
         }
         found.obstacles = [&self.pieces.still[..], &self.notes, &self.searched(&problem, &searched)].concat();
-        if problem.course.equations.rows.is_some() {
+        if problem.driven.equations.rows.is_some() {
             let states = States::new(on_pieces, &self.pieces.smoothed);
             found.obstacles.extend(on_pieces.off_constraints(&fitted.x, (&states.q, &states.v)));
         }
@@ -255,7 +255,7 @@ impl<'a> Setup<'a> {
         if self.is_forced() {
             // Force errors accumulate: longer segments show them best.
             let mut longer = joined(&fitted.segments);
-            problem.settle(&fitted.x, &mut longer, START_ROUNDS);
+            problem.fit_starts(&fitted.x, &mut longer, START_ROUNDS);
             problem.estimate_force_noise(&fitted.x, &longer);
         }
         if !self.knows_noise() {

@@ -1,6 +1,6 @@
 //! Chooses the number of integration steps between samples.
 
-use super::course::Segment;
+use super::driven::Segment;
 use super::fitted::{Fitted, log, refit};
 use super::solve::Problem;
 use super::thresholds::{INTEGRATION_ERROR, ITERATIONS, MOST_SUBSTEPS, STEP_PROBES};
@@ -8,12 +8,12 @@ use super::thresholds::{INTEGRATION_ERROR, ITERATIONS, MOST_SUBSTEPS, STEP_PROBE
 /// Halves the integration steps until the search converges. Where a force changes abruptly, such as dry friction, the integration error is not a
 /// smooth function of the constants, and neither is the sum of squares.
 pub(super) fn refine_steps(problem: &mut Problem<'_>, fitted: &mut Fitted) {
-    while !fitted.normal.converged && fitted.normal.failed == 0 && problem.course.substeps < MOST_SUBSTEPS {
+    while !fitted.normal.converged && fitted.normal.failed == 0 && problem.driven.substeps < MOST_SUBSTEPS {
         if problem.cancellation.is_cancelled() {
             break;
         }
         let before = fitted.normal.decrement;
-        problem.course.substeps *= 2;
+        problem.driven.substeps *= 2;
         refit(problem, fitted, ITERATIONS);
         log(fitted, "smaller steps");
         if fitted.normal.decrement > before / 2.0 {
@@ -25,15 +25,15 @@ pub(super) fn refine_steps(problem: &mut Problem<'_>, fitted: &mut Fitted) {
 /// Increases the number of integration steps between samples until the integration error is small compared with the noise; `true` if the number
 /// changes.
 pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Segment]) -> bool {
-    let before = problem.course.substeps;
+    let before = problem.driven.substeps;
     let stride = segments.len().div_ceil(STEP_PROBES).max(1);
     let mut probes: Vec<&Segment> = segments.iter().step_by(stride).collect();
     probes.sort_by_key(|segment| std::cmp::Reverse(segment.samples));
     let n = problem.width();
     let mut coarse = problem.last_readings(x, &probes);
-    while problem.course.substeps < MOST_SUBSTEPS && problem.cancellation.go_on() {
+    while problem.driven.substeps < MOST_SUBSTEPS && problem.cancellation.go_on() {
         let mut finer = problem.clone();
-        finer.course.substeps *= 2;
+        finer.driven.substeps *= 2;
         let fine = finer.last_readings(x, &probes);
         let errors = coarse.iter().zip(&fine).flat_map(|(a, b)| {
             (0..n).map(|i| ((a[i] - b[i]) / problem.sigma[i]).abs()).filter(|e| e.is_finite()).collect::<Vec<_>>()
@@ -43,7 +43,7 @@ pub(crate) fn choose_steps(problem: &mut Problem<'_>, x: &[f64], segments: &[Seg
         if errors.get(errors.len() * 9 / 10).is_none_or(|worst| *worst < INTEGRATION_ERROR) {
             break;
         }
-        (problem.course.substeps, coarse) = (finer.course.substeps, fine);
+        (problem.driven.substeps, coarse) = (finer.driven.substeps, fine);
     }
-    problem.course.substeps != before
+    problem.driven.substeps != before
 }

@@ -152,7 +152,7 @@ fn what_free_motion_leaves_open_is_named_with_advice() {
     assert_eq!(sets.len(), 2, "{:?}", found.undetermined);
     let of = |constants: &[&str]| &found.undetermined[sets.iter().position(|set| set == constants).unwrap()];
     let mass = of(&["m"]);
-    assert!(mass.cure.contains("--force") && mass.known.is_empty(), "{mass:?}");
+    assert!(mass.advice.contains("--force") && mass.known.is_empty(), "{mass:?}");
     let pair = of(&["g", "l"]);
     let known = &pair.known[0];
     assert_eq!((known.name.as_str(), known.product, known.terms.len()), ("g/l", true, 2));
@@ -178,7 +178,7 @@ fn the_advice_names_the_larger_motion_that_is_needed() {
     let found = identify(&spring(&[]), &recording, &IdentifyOptions::default()).unwrap();
     let open = &found.undetermined[0];
     assert!(open.constants.contains(&"c".to_string()) && open.relative_error.is_some(), "{open:?}");
-    assert!(open.cure.contains("larger range of x"), "{open:?}");
+    assert!(open.advice.contains("larger range of x"), "{open:?}");
     // The determined combination is the stiffness at the amplitude of the motion.
     let [known] = &open.known[..] else { panic!("{open:?}") };
     let factor = |name: &str| known.terms.iter().find(|(known, _)| known == name).map_or(0.0, |(_, factor)| *factor);

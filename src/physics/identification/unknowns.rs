@@ -1,7 +1,7 @@
 //! The results for constants and sensors: values, standard errors, undetermined directions, and combinations that are determined nevertheless.
 
+use super::advice::{Examiner, LinearDirections};
 use super::bodies;
-use super::cure::{Examiner, LinearDirections};
 use super::determined::{Determined, echelon};
 use super::fitted::Fitted;
 use super::found::{Combination, Constant, Correlations, Identified, SensorConstant, Undetermined};
@@ -31,7 +31,7 @@ pub(super) fn unknowns(
     (quantity, normal_at): (Quantity, NormalAt<'_>),
 ) -> Identified {
     let m = fitted.x.len();
-    let recording = problem.course.recording;
+    let recording = problem.driven.recording;
     let before: Vec<f64> = start.iter().copied().chain(problem.sensors.iter().map(|sensor| sensor.perfect())).collect();
     // The list of determined sums then shows what is not determined.
     let is_linear = quantity == Quantity::Forces && problem.is_linear(&fitted.segments);
@@ -64,7 +64,7 @@ pub(super) fn unknowns(
             let moves = Moves { problem, determined: &determined, variance: square.max(f64::MIN_POSITIVE), normal_at };
             let groups = moves.groups(&x);
             x = moves.least_change(&x, &before, &groups);
-            let mut open = without_effect(&determined, &names, |group| examiner.cure(&fitted.x, group));
+            let mut open = without_effect(&determined, &names, |group| examiner.advise(&fitted.x, group));
             open.extend(groups.iter().map(|group| described(&determined, &names, (&fitted.x, group), &examiner)));
             (open, Vec::new())
         }
@@ -148,7 +148,7 @@ impl Names<'_> {
 fn without_effect(
     determined: &Determined,
     names: &Names<'_>,
-    cure: impl Fn(&Group<'_>) -> String,
+    advice: impl Fn(&Group<'_>) -> String,
 ) -> Vec<Undetermined> {
     let m = determined.size.len();
     let of = |&k: &usize| {
@@ -158,7 +158,7 @@ fn without_effect(
         let relative_error = determined.relative_error(&columns[0].change);
         let text = format!("{} is not determined{}", names.all[k], error_in_words(relative_error));
         let (constants, directions) = (names.of(&[k]), vec![vec![1.0]]);
-        Undetermined { constants, directions, known: Vec::new(), relative_error, text, cure: cure(&group) }
+        Undetermined { constants, directions, known: Vec::new(), relative_error, text, advice: advice(&group) }
     };
     determined.without_effect.iter().map(of).collect()
 }
@@ -206,7 +206,7 @@ fn described(
             numbers()
         ),
     };
-    Undetermined { constants, directions, known, relative_error, text, cure: examiner.cure(x, group) }
+    Undetermined { constants, directions, known, relative_error, text, advice: examiner.advise(x, group) }
 }
 
 /// Describes the open directions of equations that are linear in the constants.
@@ -217,11 +217,11 @@ fn linear_directions(names: &Names<'_>, open: &LinearDirections, still: &[String
         many => format!("record motion of {}, which stand still, or larger or faster motion", listed(many)),
     };
     let none = "no motion can separate them, because the forces depend only on their sums".to_string();
-    let describe = |(changes, text, cure): (&Vec<Vec<f64>>, &str, String)| {
+    let describe = |(changes, text, advice): (&Vec<Vec<f64>>, &str, String)| {
         let inside = |k: &usize| changes.iter().any(|change| change[*k] != 0.0);
         let constants = names.of(&(0..names.all.len()).filter(inside).collect::<Vec<_>>());
         let text = format!("{} {text}", listed(&constants));
-        Undetermined { constants, directions: Vec::new(), known: Vec::new(), relative_error: None, text, cure }
+        Undetermined { constants, directions: Vec::new(), known: Vec::new(), relative_error: None, text, advice }
     };
     let all = [
         (&open.without_effect, "do not affect the forces of any motion", "fix them at known values".to_string()),

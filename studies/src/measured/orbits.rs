@@ -26,7 +26,7 @@ pub const TOLD: [&str; 5] = [
 
 /// Recordings of the same orbits in other coordinates and structures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
+enum Variant {
     /// The structure `metric` of Cartesian coordinates, distances seen by their logarithm.
     Metric,
     /// A black box of the same.
@@ -35,7 +35,7 @@ enum Way {
     Spherical,
 }
 
-impl Way {
+impl Variant {
     fn name(self) -> &'static str {
         match self {
             Self::Metric => "metric, Cartesian",
@@ -57,9 +57,9 @@ impl Way {
     }
 }
 
-/// The coordinates of a way, angles unwrapped.
-fn seen(way: Way, path: &[f64]) -> Vec<f64> {
-    if way != Way::Spherical {
+/// The coordinates of a variant, angles unwrapped.
+fn seen(variant: Variant, path: &[f64]) -> Vec<f64> {
+    if variant != Variant::Spherical {
         return path.to_vec();
     }
     let (mut all, mut last) = (Vec::new(), 0.0_f64);
@@ -73,21 +73,21 @@ fn seen(way: Way, path: &[f64]) -> Vec<f64> {
 }
 
 /// Orbits as they were seen.
-fn recording(way: Way, orbits: &[Orbit]) -> Recording {
+fn recording(variant: Variant, orbits: &[Orbit]) -> Recording {
     let tracks = orbits.iter().enumerate().map(|(k, orbit)| {
-        let least = if way == Way::Spherical { SPHERICAL } else { 0.0 };
+        let least = if variant == Variant::Spherical { SPHERICAL } else { 0.0 };
         let seen_rows = orbit.q.chunks_exact(4).take_while(|q| distance(q) > least).count();
         RecordedTrajectory {
             name: format!("orbit {k}"),
             times: orbit.times[..seen_rows].to_vec(),
-            q: seen(way, &orbit.noisy[..4 * seen_rows]),
+            q: seen(variant, &orbit.noisy[..4 * seen_rows]),
             v: vec![],
             a: vec![],
             force: vec![],
         }
     });
-    let names = if way == Way::Spherical { ["t", "r", "theta", "phi"] } else { ["t", "x", "y", "z"] };
-    let periodic = vec![false, false, false, way == Way::Spherical];
+    let names = if variant == Variant::Spherical { ["t", "r", "theta", "phi"] } else { ["t", "x", "y", "z"] };
+    let periodic = vec![false, false, false, variant == Variant::Spherical];
     Recording { coordinates: names.map(String::from).to_vec(), periodic, tracks: tracks.collect() }
 }
 
@@ -95,7 +95,7 @@ fn recording(way: Way, orbits: &[Orbit]) -> Recording {
 /// that have full windows of the first kind.
 fn accelerations(orbits: usize, noise: f64) -> [Vec<f64>; 2] {
     let orbits = recorded_orbits::orbits(orbits, noise, 0);
-    let recording = recording(Way::Metric, &orbits);
+    let recording = recording(Variant::Metric, &orbits);
     let varying = Smoothing::choose(&recording, &SmoothOptions::default()).expect("long orbits");
     let constant = Smoothing { varying: false, ..varying.clone() };
     let size = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>().sqrt();
@@ -121,30 +121,30 @@ fn accelerations(orbits: usize, noise: f64) -> [Vec<f64>; 2] {
 }
 
 /// Fits one recording as `lnn fit` does, and reads the hole.
-fn told(way: Way, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, usize)) -> Vec<Reading> {
-    let fit = Fit::recording(recording(way, &recorded_orbits::orbits(orbits, noise, 0)))
+fn fitted(variant: Variant, orbits: usize, noise: f64, (epochs, threads): (Option<usize>, usize)) -> Vec<Reading> {
+    let fit = Fit::recording(recording(variant, &recorded_orbits::orbits(orbits, noise, 0)))
         .options(|options| options.targets = Some(Targets::Smoothed))
-        .configure(move |config| choose(config, way, epochs))
+        .configure(move |config| choose(config, variant, epochs))
         .threads(threads);
-    let (system, learned) = (way.system(), fit.run().expect("a fit").network);
+    let (system, learned) = (variant.system(), fit.run().expect("a fit").network);
     let exact = system.build().expect("the defaults are valid");
-    let range = if way == Way::Spherical { (3.0, 36.0) } else { (2.5, 36.0) };
-    let pair = LearnedHole { exact: &*exact, learned: &learned, system: &system, around: way.around(), range };
+    let range = if variant == Variant::Spherical { (3.0, 36.0) } else { (2.5, 36.0) };
+    let pair = LearnedHole { exact: &*exact, learned: &learned, system: &system, around: variant.around(), range };
     pair.readings().expect("an exact metric")
 }
 
-/// What is chosen beside the usual configuration, for a way to learn.
-fn choose(config: &mut FitConfig, way: Way, epochs: Option<usize>) {
+/// What is chosen beside the usual configuration, for a variant to learn.
+fn choose(config: &mut FitConfig, variant: Variant, epochs: Option<usize>) {
     let training = &mut config.training;
     let time = || "t".to_string();
     training.network.time_like = Some(time());
     training.network.cyclic = vec![time()];
     training.data.acceleration_weighting = 1.0;
-    match way {
-        Way::BlackBox => training.penalty = Regularizer::LorentzianSylvester { lambda: 100.0, time: time() },
-        Way::Metric | Way::Spherical => training.take_structure(Structure::Metric),
+    match variant {
+        Variant::BlackBox => training.penalty = Regularizer::LorentzianSylvester { lambda: 100.0, time: time() },
+        Variant::Metric | Variant::Spherical => training.take_structure(Structure::Metric),
     }
-    if way != Way::Spherical {
+    if variant != Variant::Spherical {
         training.network.scaling = Scaling::None;
         training.network.radial = vec![["x", "y", "z"].map(String::from).to_vec()];
         training.network.radial_unit = Some(2.0);
@@ -171,17 +171,17 @@ pub fn compare(cases: &[(usize, f64)], beside: bool, work: (Option<usize>, usize
             println!("  accelerations, {orbits:4} orbits, noise {noise:5.2} %, {windows:15}: {}", errors.join("  "));
         }
     }
-    let ways = [Way::Metric, Way::BlackBox, Way::Spherical];
-    for way in &ways[..if beside { 3 } else { 1 }] {
+    let variants = [Variant::Metric, Variant::BlackBox, Variant::Spherical];
+    for variant in &variants[..if beside { 3 } else { 1 }] {
         // The others once, where the first has it easy.
-        let cases = if *way == Way::Metric { cases } else { &cases[cases.len() - 1..] };
+        let cases = if *variant == Variant::Metric { cases } else { &cases[cases.len() - 1..] };
         for &(orbits, noise) in cases {
             let began = Instant::now();
-            let readings = told(*way, orbits, noise, work);
+            let readings = fitted(*variant, orbits, noise, work);
             let seconds = began.elapsed().as_secs_f64();
             let error = |name: &str| readings.iter().find(|r| r.quantity == name).and_then(|r| r.error);
             let cells = TOLD.map(|name| error(name).map_or("-".to_string(), |e| format!("{:.3} %", 100.0 * e)));
-            let name = way.name();
+            let name = variant.name();
             println!(
                 "  {name:22} {orbits:4} orbits, noise {:5.2} %: {}; {seconds:.0} s",
                 100.0 * noise,

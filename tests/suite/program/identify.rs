@@ -86,8 +86,8 @@ fn rows_and_open_directions_are_named() {
     assert_eq!((&outlier["row"], &outlier["coordinate"]), (&Value::from(301), &Value::from("theta1")), "{outlier}");
     // A force tells one of the two directions; masses beside lengths and gravity stay together whatever the motion.
     let open = found["undetermined"].as_array().unwrap();
-    let (directions, cure) = (open[0]["directions"].as_array().unwrap(), open[0]["cure"].as_str().unwrap());
-    assert!(open.len() == 1 && directions.len() == 2 && cure.contains("--force"), "{open:?}");
+    let (directions, advice) = (open[0]["directions"].as_array().unwrap(), open[0]["advice"].as_str().unwrap());
+    assert!(open.len() == 1 && directions.len() == 2 && advice.contains("--force"), "{open:?}");
     let shown = lnn(&all);
     assert!(shown.code == Some(0) && shown.stdout.contains("301"), "{}", shown.stdout);
 }
@@ -140,7 +140,7 @@ fn what_free_pendula_tell_is_the_same_from_every_start() {
     let truth = [("m1", 1.0), ("m2", 1.0), ("l1", 1.0), ("l2", 1.0), ("c1", 0.08), ("c2", 0.05), ("g", 9.81)];
     let truth: BTreeMap<&str, f64> = truth.into();
     let base = ["identify", DATA, "--system", SYSTEM, "--trajectory", "run", "--json"];
-    let mut cures = Vec::new();
+    let mut all_advice = Vec::new();
     for start in [&[][..], &["m1=3", "g=4", "c2=0.2"], &["l1=2", "l2=0.5", "m2=2"]] {
         let params: Vec<&str> = start.iter().flat_map(|pair| ["--param", pair]).collect();
         let run = lnn(&[&base[..], &["--constants", "m1,m2,l1,l2,g,c1,c2"], &params].concat());
@@ -154,9 +154,9 @@ fn what_free_pendula_tell_is_the_same_from_every_start() {
             let [value, error] = ["value", "standard_error"].map(|key| known[key].as_f64().unwrap());
             assert!((value - exact).abs() < 3.0 * error && error < 0.1 * exact, "{start:?}: {known} {exact}");
         }
-        cures.push(open["cure"].clone());
+        all_advice.push(open["advice"].clone());
     }
-    assert!(cures.iter().all(|cure| *cure == cures[0]), "{cures:?}");
+    assert!(all_advice.iter().all(|advice| *advice == all_advice[0]), "{all_advice:?}");
 }
 
 #[test]

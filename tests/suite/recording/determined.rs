@@ -30,8 +30,9 @@ fn what_is_stated_is_true_and_is_the_same_from_every_start() {
                 assert!(moved <= value.error, "kind {kind}: {} {} {moved}", value.name, value.value);
             }
         }
-        let cures = |found: &Identified| found.undetermined.iter().map(|open| open.cure.clone()).collect::<Vec<_>>();
-        assert_eq!(cures(&found[0]), cures(&found[1]), "kind {kind}");
+        let all_advice =
+            |found: &Identified| found.undetermined.iter().map(|open| open.advice.clone()).collect::<Vec<_>>();
+        assert_eq!(all_advice(&found[0]), all_advice(&found[1]), "kind {kind}");
     }
 }
 
@@ -117,7 +118,7 @@ fn inertias_of_an_arm_are_those_of_bodies_and_a_joint_that_stands_still_is_named
         let found = identify(&arm(&[]), &log(sizes), &IdentifyOptions::default()).unwrap();
         let bodies = found.bodies.as_ref().unwrap();
         assert!(bodies.exist && is_positive_everywhere(&found), "{bodies:?} {:?}", found.constants);
-        let still = found.undetermined.iter().any(|open| open.cure.contains("q2, which stands still"));
+        let still = found.undetermined.iter().any(|open| open.advice.contains("q2, which stands still"));
         assert_eq!(still, sizes[1] == 0.0, "{:?}", found.undetermined);
         // Friction is no part of what the equations hold together.
         let held = found.undetermined.iter().filter(|open| open.text.contains("equations"));

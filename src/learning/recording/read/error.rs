@@ -46,12 +46,12 @@ pub enum Problem {
     #[error("row {0}: bytes that are not text")]
     NotText(u64),
     /// The file has a foreign format.
-    #[error("{name}, a format that is not supported: {cure}")]
+    #[error("{name}, a format that is not supported: {help}")]
     Foreign {
         /// The format.
         name: &'static str,
         /// How to convert the file to a readable format.
-        cure: &'static str,
+        help: &'static str,
     },
     /// One file has several problems.
     #[error("{}", joined(first, *more))]

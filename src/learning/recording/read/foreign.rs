@@ -39,16 +39,16 @@ const FORMATS: [(usize, &[u8], &str, &str); 14] = [
 /// Rejects a file that begins with the magic bytes of a foreign format.
 pub fn refuse(start: &[u8]) -> Result<(), Problem> {
     let found = FORMATS.iter().find(|(at, mark, ..)| start.get(*at..).is_some_and(|from| from.starts_with(mark)));
-    found.map_or(Ok(()), |&(.., name, cure)| Err(Problem::Foreign { name, cure }))
+    found.map_or(Ok(()), |&(.., name, help)| Err(Problem::Foreign { name, help }))
 }
 
 /// Identifies an archive that does not contain arrays, by its entries.
 pub fn archive<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<Problem> {
-    let (name, cure) = names.find_map(|name| match name {
+    let (name, help) = names.find_map(|name| match name {
         "content.xml" => Some(("an OpenDocument sheet (.ods)", SAVE_AS)),
         "xl/workbook.bin" => Some(("a binary Excel workbook (.xlsb)", SAVE_AS)),
         _ if name.ends_with(".csv") || name.ends_with(".txt") => Some(("a ZIP archive of text", UNPACK)),
         _ => None,
     })?;
-    Some(Problem::Foreign { name, cure })
+    Some(Problem::Foreign { name, help })
 }

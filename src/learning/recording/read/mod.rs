@@ -158,7 +158,7 @@ fn parse(mut file: File, size: u64, columns: &Columns) -> Result<(FileFacts, Vec
         input = Box::new(unpacked);
         let packed = [npy::MAGIC, gzip::MAGIC].into_iter().chain(archive::MAGIC);
         if packed.into_iter().any(|magic| start.starts_with(magic)) {
-            return Err(Problem::Foreign { name: "an archive or array packed by gzip", cure: "unpack it first" });
+            return Err(Problem::Foreign { name: "an archive or array packed by gzip", help: "unpack it first" });
         }
     }
     foreign::refuse(&start)?;

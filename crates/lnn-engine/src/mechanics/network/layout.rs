@@ -234,7 +234,7 @@ impl Architecture {
             }
         }
         if self.form.structure.has_signature() && kind != Initialization::NearZero {
-            settle(&layout, &self.initial_biases(), self.form.factor.variation(), &mut weights);
+            start_near_identity(&layout, &self.initial_biases(), self.form.factor.variation(), &mut weights);
         }
         let constants = self.own_constants().map_or(Vec::new(), |(_, initial)| initial);
         for (place, initial) in layout.constants.clone().zip(constants) {
@@ -256,7 +256,7 @@ impl Architecture {
 
 /// Initializes a structure with a mass matrix near 1.7 times the identity and almost no forces. A random metric would have curvature forces
 /// at every velocity, which training would have to remove first.
-fn settle<S: Scalar>(layout: &Layout, biases: &[(usize, f64)], variation: f64, weights: &mut [S]) {
+fn start_near_identity<S: Scalar>(layout: &Layout, biases: &[(usize, f64)], variation: f64, weights: &mut [S]) {
     for (k, branch) in layout.branches.iter().enumerate() {
         let output = &branch.layers[branch.layers.len() - 1];
         weights[output.weight_range()].iter_mut().for_each(|w| *w *= S::of_f64(variation));

@@ -4,8 +4,8 @@
 //! The criteria are ranks and determinants of the joint effect of all open directions, which do not depend on their basis. The advice is specific
 //! only if it is the same at every point along the open directions where the search may have ended.
 
-use super::course::Segment;
 use super::determined::{OpenDirection, echelon};
+use super::driven::Segment;
 use super::follow::Follower;
 use super::moves::Group;
 use super::solve::Problem;
@@ -101,7 +101,7 @@ impl Examiner<'_> {
         let lanes: Vec<&Segment> = self.segments.iter().collect();
         let all: usize = lanes.iter().map(|segment| segment.samples).sum();
         let stride = all.div_ceil(MOST_PROBED_STATES).max(1);
-        Follower::new(&self.problem.course).follow(&self.problem.parameters(x), &lanes, false, |_, sample, state| {
+        Follower::new(&self.problem.driven).follow(&self.problem.parameters(x), &lanes, false, |_, sample, state| {
             if sample % stride == 0 {
                 let over = |lane: usize| sample >= lanes[lane].samples;
                 for lane in (0..lanes.len()).filter(|lane| !over(*lane)) {
@@ -118,7 +118,7 @@ impl Examiner<'_> {
         let (n, m) = (self.n(), self.problem.chosen.len());
         let probe = &self.on_constraints(point.x, probe.clone());
         let values = self.problem.parameters(point.x);
-        let mut follower = Follower::new(&self.problem.course);
+        let mut follower = Follower::new(&self.problem.driven);
         let mut a = vec![0.0; probe.q.len()];
         follower.accelerate(&values, (&probe.q, &probe.v), &probe.force, &mut a);
         let slopes = follower.slopes(&values, (&probe.q, &probe.v, &a));
@@ -137,7 +137,7 @@ impl Examiner<'_> {
         let n = self.n();
         let mut a = vec![0.0; probe.q.len()];
         let values = self.problem.parameters(x);
-        Follower::new(&self.problem.course).accelerate(&values, (&probe.q, &probe.v), &[], &mut a);
+        Follower::new(&self.problem.driven).accelerate(&values, (&probe.q, &probe.v), &[], &mut a);
         let of = |i: usize| {
             let own: Vec<f64> = a.iter().skip(i).step_by(n).copied().filter(|a| a.is_finite()).collect();
             let square = dot(&own, &own) / own.len().max(1) as f64;
@@ -179,7 +179,7 @@ impl Examiner<'_> {
     fn forced_probe(&self, x: &[f64], (recorded, sizes): (&Probe, &[f64])) -> Probe {
         let n = self.n();
         let mut driven = recorded.clone();
-        let mut follower = Follower::new(&self.problem.course);
+        let mut follower = Follower::new(&self.problem.driven);
         let mut a = vec![0.0; driven.q.len()];
         follower.accelerate(&self.problem.parameters(x), (&driven.q, &driven.v), &[], &mut a);
         let push = |(at, mass): (usize, &f64)| mass.abs() * sizes[at % n];
@@ -191,7 +191,7 @@ impl Examiner<'_> {
     }
 
     /// Advice on how to determine a group of open directions.
-    pub fn cure(&self, x: &[f64], group: &Group<'_>) -> String {
+    pub fn advise(&self, x: &[f64], group: &Group<'_>) -> String {
         if self.problem.measured.is_some() {
             return OTHER_READINGS.into();
         }
@@ -219,7 +219,7 @@ impl Examiner<'_> {
         let (by_either, _) = split(&both);
         let never = count - by_either.len();
         let by_force = by_either.len().saturating_sub(by_motion.len());
-        let forced = self.problem.course.recording.tracks.iter().any(|track| !track.force.is_empty());
+        let forced = self.problem.driven.recording.tracks.iter().any(|track| !track.force.is_empty());
         let mut cures = Vec::new();
         if by_force > 0 {
             cures.push(match forced {
@@ -285,7 +285,7 @@ impl Examiner<'_> {
         let largest = probe.v.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let mut a = vec![0.0; probe.v.len()];
         (0..n).for_each(|i| spread((&mut a, n), (i, DRIVE), [-largest, largest]));
-        let mut follower = Follower::new(&self.problem.course);
+        let mut follower = Follower::new(&self.problem.driven);
         let slopes = follower.force_slopes(&self.problem.parameters(x), (&probe.q, &probe.v, &a));
         let rows: Vec<&[f64]> = slopes.chunks_exact(2 * n + m).map(|row| &row[2 * n..]).collect();
         let (columns, separate) = effects((&rows, 0.0), changes, |_| 1.0);
@@ -304,7 +304,7 @@ impl Examiner<'_> {
 
     /// Coordinates that do not move.
     pub fn still(&self) -> Vec<String> {
-        let recording = self.problem.course.recording;
+        let recording = self.problem.driven.recording;
         let n = self.n();
         let deviation = |i: usize| {
             let own = recording.tracks.iter().flat_map(|track| track.q.iter().skip(i).step_by(n));

@@ -9,7 +9,7 @@ use crate::identification::{ResidualPath, Segment};
 use crate::names::rounded;
 
 /// Held-out motion as a test of a model.
-pub(super) struct Judged<'a> {
+pub(super) struct HeldOutTest<'a> {
     pub search: &'a Search<'a>,
     pub model: &'a Model,
     pub segments: &'a [Segment],
@@ -19,7 +19,7 @@ pub(super) struct Judged<'a> {
     pub count: f64,
 }
 
-impl Judged<'_> {
+impl HeldOutTest<'_> {
     pub fn residual(&self) -> f64 {
         (self.square / self.count.max(1.0)).sqrt()
     }

@@ -18,7 +18,7 @@ pub(crate) struct Segment {
 
 /// Everything that the integration needs: the recorded times and forces, and the equations.
 #[derive(Clone, Debug)]
-pub(crate) struct Course<'a> {
+pub(crate) struct DrivenEquations<'a> {
     pub recording: &'a Recording,
     pub equations: &'a Equations,
     /// Number of constants by which derivatives are taken.
@@ -40,7 +40,7 @@ pub(crate) struct Inputs<'a> {
     pub values: &'a [f64],
 }
 
-impl Course<'_> {
+impl DrivenEquations<'_> {
     /// Writes the known functions at a time of a trajectory: the time itself, then the inputs.
     pub(super) fn known(&self, track: usize, t: f64, into: &mut [f64]) {
         into[0] = t;
