@@ -4,9 +4,12 @@ use crate::CliError;
 use crate::arguments::number;
 use crate::arguments::spool::read_spooled;
 use crate::directories::files::ends_in;
+use crate::terminal::interrupt;
 use crate::terminal::output;
+use lnn::cancellation::Cancellation;
 use lnn::lagrangian::SystemInstance;
 use lnn::names::pluralize;
+use lnn::pipeline::{FirstLook, PipelineError};
 use lnn::recording::{ColumnGuess, Columns, DataError, Guess, LoadedRecording, Problem};
 use std::path::{Path, PathBuf};
 
@@ -240,4 +243,16 @@ fn help(columns: &Columns, problem: &Problem) -> &'static str {
         Problem::Order { .. } if columns.trajectory.is_none() => ": --trajectory COLUMN",
         _ => "",
     }
+}
+
+/// Takes a first look at recorded motion.
+///
+/// # Errors
+/// A data error for motion that cannot be smoothed, an interruption.
+pub fn first_look(reading: &LoadedRecording, guessed: Vec<ColumnGuess>) -> Result<FirstLook, CliError> {
+    let stop = Cancellation::by(&interrupt::flag()?);
+    FirstLook::new(reading, guessed, &stop).map_err(|error| match error {
+        PipelineError::Interrupted => CliError::nothing_written(),
+        error => error.into(),
+    })
 }

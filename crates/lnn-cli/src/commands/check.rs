@@ -1,11 +1,10 @@
 //! `lnn check`: examines recorded motion, says whether a simple law explains it, and which command to run next.
 
 use crate::CliError;
-use crate::arguments::recording_args::RecordingArgs;
-use crate::terminal::{interrupt, output};
-use lnn::cancellation::Cancellation;
-use lnn::pipeline::{FirstLook, NextStep, PipelineError};
-use lnn::recording::{ColumnGuess, Columns, Guess, LoadedRecording};
+use crate::arguments::recording_args::{RecordingArgs, first_look};
+use crate::terminal::output;
+use lnn::pipeline::{FirstLook, NextStep};
+use lnn::recording::{Columns, Guess};
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -32,18 +31,6 @@ pub fn run(args: &Args) -> Result<(), CliError> {
         findings.heading(when).code(format!("  {next}"));
     }
     output::print(&findings.to_string())
-}
-
-/// Takes a first look at recorded motion.
-///
-/// # Errors
-/// A data error for motion that cannot be smoothed, an interruption.
-pub fn first_look(reading: &LoadedRecording, guessed: Vec<ColumnGuess>) -> Result<FirstLook, CliError> {
-    let stop = Cancellation::by(&interrupt::flag()?);
-    FirstLook::new(reading, guessed, &stop).map_err(|error| match error {
-        PipelineError::Interrupted => CliError::nothing_written(),
-        error => error.into(),
-    })
 }
 
 /// The commands to run next in order of priority, each with a condition.

@@ -4,7 +4,6 @@ use crate::CliError;
 use crate::arguments::number;
 use crate::arguments::probe::{Bound, Probe, bound};
 use crate::arguments::source::parameter;
-use crate::commands::symmetries::degrees;
 use crate::terminal::format::FormatArgs;
 use lnn::symmetry::{Comparison, ComparisonSummary, Degrees, unknowns};
 
@@ -25,7 +24,7 @@ pub struct Args {
     param_b: Vec<(String, String)>,
     /// Functions that the gauge function is made of, by family and total degree: polynomial, trigonometric, hyperbolic; by
     /// default they suit the coordinates.
-    #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
+    #[arg(long, value_name = "FAMILY:DEGREE,..")]
     basis: Option<Degrees>,
     /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3 [default: the bounds that both have in common].
     #[arg(long, value_name = "NAME=LOW:HIGH,..", value_delimiter = ',', value_parser = bound)]

@@ -3,8 +3,7 @@
 use crate::CliError;
 use crate::arguments::fit_config::{Args, Plan, Saved};
 use crate::arguments::print_config::{PrintFormat, commented, fit_reference, training_reference};
-use crate::arguments::recording_args::read;
-use crate::commands::check::first_look;
+use crate::arguments::recording_args::{first_look, read};
 use crate::directories::learn::{LearnedRun, Session, open};
 use crate::directories::resume::{SavedText, reopen};
 use crate::terminal::output;

@@ -5,7 +5,6 @@ use crate::arguments::constraints::constrained;
 use crate::arguments::input;
 use crate::arguments::number::{Precision, in_precision, list};
 use crate::arguments::source::{Source, SystemOrModel};
-use crate::commands::inverse::inverse;
 use crate::terminal::format::{Format, chunk, print_rows};
 use crate::terminal::output;
 use crate::thresholds::EXAMINED_MOTION_STATES;
@@ -15,6 +14,8 @@ use lnn::recording::NumberTable;
 use lnn::scalar::Scalar;
 use lnn::symmetry::{Canonical, CanonicalForm};
 use std::path::PathBuf;
+
+mod inverse;
 
 /// Arguments.
 #[derive(Debug, clap::Args)]
@@ -89,7 +90,7 @@ fn inspect<S: Scalar>(args: &Args) -> Result<(), CliError> {
         return Err(CliError::usage("--linearize and --canonical need a system that does not depend on the time"));
     }
     if args.inverse {
-        return inverse(file, format, &source, &args.drives);
+        return inverse::inverse(file, format, &source, &args.drives);
     }
     if format == Format::Csv {
         return Err(CliError::usage("--format csv needs --inverse; use json or table"));

@@ -10,7 +10,6 @@ pub mod formula;
 pub mod geometry;
 pub mod identify;
 pub mod inspect;
-pub mod inverse;
 pub mod manual;
 pub mod page;
 pub mod rollout;

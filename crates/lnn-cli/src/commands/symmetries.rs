@@ -16,7 +16,7 @@ pub struct Args {
     subject: SystemOrModel,
     /// Functions that fields are made of, by family and total degree: polynomial, trigonometric, hyperbolic; by
     /// default they suit the coordinates.
-    #[arg(long, value_name = "FAMILY:DEGREE,..", value_parser = degrees)]
+    #[arg(long, value_name = "FAMILY:DEGREE,..")]
     basis: Option<Degrees>,
     /// Bounds of the states that are examined, such as r=4:12 or r_dot=-0.3:0.3 [default: those of the system, or the middle of the
     /// training range of the model].
@@ -36,14 +36,6 @@ pub struct Args {
     quadratic: bool,
     #[command(flatten)]
     format: FormatArgs,
-}
-
-/// Parses the degrees of families of functions.
-///
-/// # Errors
-/// The form that was expected.
-pub fn degrees(text: &str) -> Result<Degrees, String> {
-    text.parse()
 }
 
 /// Finds symmetries and prints them.
