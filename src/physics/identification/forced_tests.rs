@@ -82,7 +82,7 @@ fn a_smooth_force_is_seen_between_coarse_samples() {
     for (samples, expected) in [(2, 0.25), (1, 0.0)] {
         let force: Vec<f64> = (0..samples).map(f64::from).collect();
         let track = RecordedTrajectory { times: force.clone(), force, ..recording.tracks[0].clone() };
-        course::forces(&track, Between::Cubic, ((samples - 1) as usize, 0.25), &mut found);
+        driven::forces(&track, Between::Cubic, ((samples - 1) as usize, 0.25), &mut found);
         assert_eq!(found, [expected]);
     }
 }

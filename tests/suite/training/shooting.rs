@@ -470,7 +470,7 @@ fn refinement_ends_where_the_gradient_by_the_starts_vanishes() {
     let away = |starts: &[f64]| starts.iter().zip(&best).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
     let mut buffer = starts.clone();
     for _ in 0..20 {
-        shots.settle(&weights, &segments, (&mut starts, &rows), (&mut curvature, &mut buffer), 1.0);
+        shots.move_starts(&weights, &segments, (&mut starts, &rows), (&mut curvature, &mut buffer), 1.0);
     }
     assert!(away(&starts) < 1e-6, "{}", away(&starts));
 }
