@@ -10,12 +10,11 @@ use super::{
 use crate::lagrangian::thresholds::{LEAST_REPLAYED_STATES, STACK_COORDINATES, WIDE_COORDINATES};
 use crate::linalg::Workspace;
 use crate::platform::{Mutex, OnceLock, lock};
-use crate::scalar::{AnyFloat, Compiled, Dd, Foreign, Real, Scalar};
+use crate::scalar::{Dd, Real, Scalar, compiled};
 use crate::tape::{self, Evaluation, Program, Replay, STATES, TapeError};
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
-use core::any::Any;
 
 /// A Lagrangian and the values of its parameters.
 ///
@@ -361,30 +360,9 @@ impl<S: Scalar> Routines<S> {
         metric_jets: Evaluator::metric_jets,
         wide_metric_jets: Evaluator::metric_jets,
     };
-
-    fn get() -> Self {
-        *S::routines().downcast_ref().expect("every scalar holds its own routines")
-    }
 }
 
-macro_rules! compiled {
-    ($($scalar:ty)*) => {$(
-        impl Compiled for $scalar {
-            // If this were inlined elsewhere, the routines would be compiled there as well.
-            #[inline(never)]
-            fn routines() -> &'static dyn Any {
-                &Routines::<Self>::ALL
-            }
-        }
-    )*};
-}
-compiled!(f32 f64 Dd);
-
-impl<F: Foreign> Compiled for AnyFloat<F> {
-    fn routines() -> &'static dyn Any {
-        &Routines::<Self>::ALL
-    }
-}
+compiled!(Lagrangians, Routines);
 
 impl<L: Lagrangian, S: Scalar> EulerLagrange<S> for Mechanics<L, S> {
     fn coordinates(&self) -> usize {

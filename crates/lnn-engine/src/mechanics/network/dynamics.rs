@@ -70,12 +70,8 @@ impl<S: Scalar> Model<S> {
 }
 
 impl Architecture {
-    /// Records the functions of a network of this shape.
-    ///
-    /// # Panics
-    /// If the architecture is inconsistent (see [`Architecture::validate`]).
-    #[doc(hidden)]
-    pub fn model<S: Scalar>(&self) -> Model<S> {
+    /// Records the functions of a network of this shape, as [`Architecture::model`] does.
+    pub(super) fn record<S: Scalar>(&self) -> Model<S> {
         let scale = || self.scale.iter().map(|&s| S::of_f64(s)).collect();
         let layout = Layout::new(self);
         let parameters = layout.parameters;

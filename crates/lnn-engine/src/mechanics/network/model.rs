@@ -7,7 +7,7 @@ use crate::lagrangian::{
 use crate::linalg;
 use crate::network::{Architecture, Dynamics, Form, Layout, Model};
 use crate::platform::{Mutex, lock};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::{Real, Scalar, compiled};
 use crate::tape::{Depth, Program, STATES};
 use alloc::boxed::Box;
 use alloc::string::{String, ToString};
@@ -25,19 +25,21 @@ pub struct NetworkLagrangian<S> {
     model: Model<S>,
     /// Workspaces that are currently not in use.
     idle: Mutex<Vec<Workspace<S>>>,
-    code: Code<S>,
+    routines: Routines<S>,
 }
 
-/// The evaluation code of a network as function pointers: it is compiled where networks are created, so that a crate that receives one from
-/// a training does not compile it again.
+/// What is computed of networks, as function pointers: it is compiled once for each scalar, so that no crate that creates, loads or calls a
+/// network compiles it again.
 #[derive(Clone, Copy, Debug)]
-struct Code<S> {
+struct Routines<S> {
+    model: ModelOf<S>,
     terms: TermsOf<S>,
     metric_jets: JetsOf<S>,
     slopes: SlopesOf<S>,
     pattern: PatternOf<S>,
 }
 
+type ModelOf<S> = fn(&Architecture) -> Model<S>;
 type TermsOf<S> = fn(&NetworkLagrangian<S>, &[S], &[S], Request, &mut Terms<S>) -> Result<(), MechanicsError>;
 type PatternOf<S> = fn(&NetworkLagrangian<S>) -> Option<Pattern>;
 type SlopesOf<S> = for<'a> fn(&'a NetworkLagrangian<S>) -> Box<dyn Slopes<S> + 'a>;
@@ -168,14 +170,9 @@ impl<S: Scalar> NetworkLagrangian<S> {
     }
 
     fn of_valid(architecture: Architecture, weights: Vec<S>) -> Self {
-        let (model, idle) = (architecture.model(), Mutex::new(Vec::new()));
-        let code = Code {
-            terms: Self::evaluate_terms,
-            metric_jets: Self::evaluate_metric_jets,
-            slopes: Self::new_slopes,
-            pattern: Self::find_pattern,
-        };
-        Self { architecture, weights, model, idle, code }
+        let routines = Routines::get();
+        let (model, idle) = ((routines.model)(&architecture), Mutex::new(Vec::new()));
+        Self { architecture, weights, model, idle, routines }
     }
 
     /// Returns the shape of the network.
@@ -240,6 +237,29 @@ impl<S: Scalar> NetworkLagrangian<S> {
     }
 }
 
+impl<S: Scalar> Routines<S> {
+    const ALL: Self = Self {
+        model: Architecture::record,
+        terms: NetworkLagrangian::evaluate_terms,
+        metric_jets: NetworkLagrangian::evaluate_metric_jets,
+        slopes: NetworkLagrangian::new_slopes,
+        pattern: NetworkLagrangian::find_pattern,
+    };
+}
+
+compiled!(Networks, Routines, "model-files");
+
+impl Architecture {
+    /// Records the functions of a network of this shape.
+    ///
+    /// # Panics
+    /// If the architecture is inconsistent (see [`Architecture::validate`]).
+    #[doc(hidden)]
+    pub fn model<S: Scalar>(&self) -> Model<S> {
+        (Routines::get().model)(self)
+    }
+}
+
 impl<S: Scalar> Workspace<S> {
     fn new(model: &Model<S>) -> Self {
         Self { dynamics: Dynamics::new(model), wrapped: Vec::new(), linalg: linalg::Workspace::new() }
@@ -293,19 +313,19 @@ impl<S: Scalar> EulerLagrange<S> for NetworkLagrangian<S> {
     }
 
     fn terms(&self, q: &[S], v: &[S], request: Request, terms: &mut Terms<S>) -> Result<(), MechanicsError> {
-        (self.code.terms)(self, q, v, request, terms)
+        (self.routines.terms)(self, q, v, request, terms)
     }
 
     fn metric_jets(&self, q: &[S], v: &[S]) -> Result<Vec<MetricJet<S>>, MechanicsError> {
-        (self.code.metric_jets)(self, q, v)
+        (self.routines.metric_jets)(self, q, v)
     }
 
     fn pattern(&self) -> Option<Pattern> {
-        (self.code.pattern)(self)
+        (self.routines.pattern)(self)
     }
 
     fn slopes(&self) -> Option<Box<dyn Slopes<S> + '_>> {
-        Some((self.code.slopes)(self))
+        Some((self.routines.slopes)(self))
     }
 
     fn conserves_energy(&self) -> bool {

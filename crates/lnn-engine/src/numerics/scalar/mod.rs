@@ -25,7 +25,7 @@ mod matrix;
 mod primitive;
 mod sum;
 
-pub(crate) use compiled::Compiled;
+pub(crate) use compiled::{Compiled, Lagrangians, Networks, Tapes, compiled};
 pub use dd::{Dd, UnreadableNumber};
 pub(crate) use lanes::sin_cos_lane;
 pub(crate) use lanes::{Exponential, Lanes, cos_lanes, exp_lanes, ln_lanes, sin_lanes, sqrt_lanes, tanh_lanes};
@@ -236,7 +236,9 @@ pub trait Scalar:
     + Lanes
     + Dots
     + Matrices
-    + Compiled
+    + Compiled<Tapes>
+    + Compiled<Lagrangians>
+    + Compiled<Networks>
     + PartialEq
     + PartialOrd
     + Default

@@ -4,7 +4,7 @@ use super::kernel::resize;
 use super::operation::{Forward, Kept, MixedForward, MixedReverse, PARTIALS, Reverse, SecondOrder};
 use super::value::{Dependence, Order, Store, View};
 use super::{Recorded, STATES};
-use crate::scalar::{Column, Real, Scalar, update_column};
+use crate::scalar::{Column, Real, Scalar, compiled, update_column};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -96,6 +96,10 @@ impl<S: Scalar> Evaluation<S> {
     /// # Panics
     /// Panics if there are more than [`STATES`] states or too few parameters.
     pub fn evaluate(&mut self, parameters: &[S], q: &[S], v: &[S], depth: Depth) {
+        (Routines::get().evaluate)(self, parameters, (q, v), depth);
+    }
+
+    fn sweep(&mut self, parameters: &[S], (q, v): (&[S], &[S]), depth: Depth) {
         let recorded = Arc::clone(&self.recorded);
         let n = recorded.coordinates();
         let lanes = q.len() / n;
@@ -207,7 +211,7 @@ impl<S: Scalar> Evaluation<S> {
         gradient: &mut [S],
         inputs: Option<(&mut [S], &mut [S])>,
     ) {
-        self.add_mixed(Order::Second, parameters, directions, gradient, inputs);
+        (Routines::get().add_mixed)(self, Order::Second, parameters, directions, gradient, inputs);
     }
 
     /// Gradient of the first derivative `u . dL/d(v/s)`, with `u` the directions' `s`.
@@ -218,7 +222,7 @@ impl<S: Scalar> Evaluation<S> {
         gradient: &mut [S],
         inputs: Option<(&mut [S], &mut [S])>,
     ) {
-        self.add_mixed(Order::First, parameters, directions, gradient, inputs);
+        (Routines::get().add_mixed)(self, Order::First, parameters, directions, gradient, inputs);
     }
 
     fn add_mixed(
@@ -271,6 +275,23 @@ impl<S: Scalar> Evaluation<S> {
         }
     }
 }
+
+/// The sweeps of an evaluation, which are compiled once for each scalar.
+#[derive(Clone, Copy)]
+struct Routines<S> {
+    evaluate: EvaluateOf<S>,
+    add_mixed: AddMixedOf<S>,
+}
+
+type EvaluateOf<S> = fn(&mut Evaluation<S>, &[S], (&[S], &[S]), Depth);
+type Inputs<'a, S> = Option<(&'a mut [S], &'a mut [S])>;
+type AddMixedOf<S> = fn(&mut Evaluation<S>, Order, &[S], &MixedDirections<S>, &mut [S], Inputs<'_, S>);
+
+impl<S: Scalar> Routines<S> {
+    const ALL: Self = Self { evaluate: Evaluation::sweep, add_mixed: Evaluation::add_mixed };
+}
+
+compiled!(Tapes, Routines);
 
 /// Depth of an evaluation of a Lagrangian; each step includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
