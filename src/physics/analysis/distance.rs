@@ -134,7 +134,7 @@ pub struct CoordinateError {
 }
 
 impl CoordinateError {
-    /// Largest error over some coordinates, which have one unit, at every time; `NaN` where one is.
+    /// Largest error at every time of some coordinates with the same unit; `NaN` where one of them is.
     pub fn largest(&self, coordinates: &[usize]) -> Vec<f64> {
         let rows = self.per_coordinate.chunks_exact(self.coordinates.max(1));
         let worst = |row: &[f64]| {

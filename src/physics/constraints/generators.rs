@@ -147,8 +147,8 @@ impl<'a> Vanishing<'a> {
         Level { degree, terms, rows, pivots, gap }
     }
 
-    /// Ratio between combinations that do not vanish and those that do: the smallest over the degrees of those taken, or that of the highest
-    /// degree if none was taken.
+    /// Size of the smallest combination that does not vanish over that of the largest one that does. Of several degrees it is the smallest
+    /// ratio; if no generator was taken, it is that of the highest degree.
     pub fn gap(&self, taken: &[Generator]) -> Option<f64> {
         let has = |degree| taken.iter().any(|generator| generator.degree(self.features) == degree);
         let gaps = self.levels.iter().filter(|level| has(level.degree)).filter_map(|level| level.gap);

@@ -272,8 +272,8 @@ impl Region {
 
     /// Coordinates and velocities `(states, n)`, uniform in the box, the same for the same seed.
     ///
-    /// `accept` may change a velocity, such as the one that a mass shell fixes, and refuses a state by `false`; the result is
-    /// shorter where it refuses nearly all.
+    /// `accept` may change a velocity, such as the one that a mass shell fixes, and returns `false` to reject a state. If it rejects nearly
+    /// all of them, fewer states are returned.
     pub fn states(
         &self,
         states: usize,

@@ -3,7 +3,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Two coordinates, `sin 3t + 0.4 cos 7t` and its half at twice the pace, exact: position, velocity, acceleration.
+/// Exact position, velocity and acceleration of two coordinates: `sin 3t + 0.4 cos 7t`, and half of it with twice the frequencies.
 fn exact(t: f64) -> [[f64; 2]; 3] {
     let wave = |p: f64, s: f64| {
         let (a, b) = (3.0 * p, 7.0 * p);

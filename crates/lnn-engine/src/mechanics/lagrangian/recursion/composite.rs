@@ -6,7 +6,7 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 
 impl<R: Real> Body<R> {
-    /// Returns the body in and about the previous frame.
+    /// Returns the body in the axes of the previous frame and about its origin.
     fn seen(&self, frame: &Frame<R>) -> Self {
         let turned = frame.outward::<true>(self.first);
         let first = add(turned, scaled(self.mass, frame.place));
