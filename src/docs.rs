@@ -86,6 +86,7 @@ macro_rules! page {
             "[valid]: crate::docs::method#time-of-valid-prediction\n",
             "[off-shell]: crate::docs::method#metrics-from-geodesics\n",
             "[derivatives]: crate::docs::method#derivatives-of-the-network\n",
+            "[compiled-once]: crate::docs::architecture#what-is-compiled-where\n",
             "[page]: crate::docs::commands#lnn-page\n",
             "[library]: crate::docs::library\n",
             "[stability]: crate::docs::library#stability\n",
