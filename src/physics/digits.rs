@@ -1,19 +1,6 @@
 //! JSON of numbers of any precision with all their digits.
 
-use crate::linalg::Inertia;
 use crate::scalar::Scalar;
-
-/// The value of a named quantity of `n` coordinates.
-pub enum Value<S> {
-    /// The point does not have it.
-    Missing,
-    /// A number.
-    Number(S),
-    /// Numbers of negative and positive eigenvalues.
-    Signature(Inertia),
-    /// Components of a tensor, `(.., n, n)`, and its rank.
-    Tensor(Vec<S>, usize),
-}
 
 /// A number with 9 significant digits (`f32`), 17 (`f64`) or as many as its text has (double-double); `null` if it is not finite, which
 /// JSON cannot represent.
@@ -42,23 +29,12 @@ pub fn object(fields: impl IntoIterator<Item = (&'static str, String)>) -> Strin
     format!("{{{}}}\n", fields.collect::<Vec<_>>().join(","))
 }
 
-/// Nested lists of the components `(.., n, n)` of a tensor, the last index innermost.
-fn tensor<S: Scalar>(values: &[S], n: usize, rank: usize) -> String {
+/// Nested lists of the components `(.., n, n)` of a tensor, the last index innermost; a number for rank 0.
+pub fn tensor<S: Scalar>(values: &[S], n: usize, rank: usize) -> String {
     match rank {
-        0 | 1 => list(values.iter().map(|x| number(*x))),
+        0 => values.first().map_or("null".to_string(), |x| number(*x)),
+        1 => list(values.iter().map(|x| number(*x))),
         _ => list(values.chunks(n.pow(rank as u32 - 1).max(1)).map(|part| tensor(part, n, rank - 1))),
-    }
-}
-
-impl<S: Scalar> Value<S> {
-    /// The value in JSON; `n` is the number of coordinates.
-    pub fn json(&self, n: usize) -> String {
-        match self {
-            Self::Missing => "null".to_string(),
-            Self::Number(x) => number(*x),
-            Self::Signature(signature) => format!("[{},{}]", signature.negative, signature.positive),
-            Self::Tensor(values, rank) => tensor(values, n, *rank),
-        }
     }
 }
 
@@ -80,9 +56,9 @@ mod tests {
         }
         assert_eq!(number(f64::NAN), "null");
         assert_eq!(number(f32::INFINITY), "null");
-        let rows = Value::Tensor(vec![1f32, 2.0, 3.0, 4.0, 5.0, 6.0], 2).json(2);
+        let rows = tensor(&[1f32, 2.0, 3.0, 4.0, 5.0, 6.0], 2, 2);
         assert_eq!(serde_json::from_str::<Vec<[f32; 2]>>(&rows).unwrap(), [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]);
-        let cube = Value::Tensor((0..8).map(f64::from).collect(), 3).json(2);
+        let cube = tensor(&(0..8).map(f64::from).collect::<Vec<_>>(), 2, 3);
         let nested: Vec<Vec<Vec<f64>>> = serde_json::from_str(&cube).unwrap();
         assert_eq!(nested, [[[0.0, 1.0], [2.0, 3.0]], [[4.0, 5.0], [6.0, 7.0]]]);
         assert_eq!(

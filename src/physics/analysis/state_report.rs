@@ -1,7 +1,7 @@
 //! The Euler-Lagrange terms of states, or the forces on them, by name and with all digits.
 
 use super::thresholds::{METRIC_ROUNDINGS, MOST_SHOWN_PARAMETERS};
-use crate::digits::{Value, number, object, quoted};
+use crate::digits::{number, object, quoted, tensor};
 use crate::lagrangian::{
     EulerLagrange, Linearizer, ManifoldRows, MechanicsError, ReducedMass, Request, Terms, force_parts_by_rows,
     inverse_dynamics_by_rows,
@@ -43,12 +43,8 @@ impl<S: Scalar> StateReport<S> {
     fn fields(&self) -> impl Iterator<Item = (&'static str, String)> {
         let fields = self.quantities.iter().map(|Quantity { name, numbers, rank }| {
             let is_lost = self.problem.is_some() && numbers.iter().any(|x| !x.is_finite());
-            let value = match (numbers.first(), rank) {
-                (Some(x), 0) if !is_lost => Value::Number(*x),
-                (Some(_), rank) if !is_lost => Value::Tensor(numbers.clone(), *rank),
-                _ => Value::Missing,
-            };
-            (*name, value.json(self.n))
+            let is_missing = is_lost || numbers.is_empty();
+            (*name, if is_missing { "null".to_string() } else { tensor(numbers, self.n, *rank) })
         });
         fields.chain(self.problem.as_deref().map(|problem| ("error", quoted(problem))))
     }

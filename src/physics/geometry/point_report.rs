@@ -1,10 +1,10 @@
 //! The geometry at a point by the names of the coordinates: a table for people, LaTeX for papers, and every number for files.
 
 use super::{Geometry, GeometryError};
-use crate::digits::{Value, object, quoted};
+use crate::digits::{number, object, quoted, tensor};
 use crate::findings::Findings;
 use crate::lagrangian::{EulerLagrange, Request, Terms};
-use crate::linalg::inertia;
+use crate::linalg::{Inertia, inertia};
 use crate::names::{latex_name, latex_number, rounded, trimmed};
 use crate::scalar::{Real, Scalar};
 
@@ -41,6 +41,18 @@ struct Quantity<S> {
     independent: fn(&[usize]) -> bool,
     /// The value.
     value: Value<S>,
+}
+
+/// The value of a quantity.
+enum Value<S> {
+    /// The point does not have it.
+    Missing,
+    /// A number.
+    Number(S),
+    /// Numbers of negative and positive eigenvalues.
+    Signature(Inertia),
+    /// Components of a tensor, `(n, .., n)`, and its rank.
+    Tensor(Vec<S>, usize),
 }
 
 /// Every component is independent.
@@ -191,7 +203,15 @@ impl<'a, S: Scalar> PointReport<'a, S> {
     /// Every component with all digits, as an object on one line of JSON.
     pub fn json(&self) -> String {
         let quantities = self.quantities.iter().filter(|quantity| !quantity.key.is_empty());
-        let fields = quantities.map(|quantity| (quantity.key, quantity.value.json(self.names.len())));
+        let fields = quantities.map(|quantity| {
+            let value = match &quantity.value {
+                Value::Missing => "null".to_string(),
+                Value::Number(x) => number(*x),
+                Value::Signature(signs) => format!("[{},{}]", signs.negative, signs.positive),
+                Value::Tensor(values, rank) => tensor(values, self.names.len(), *rank),
+            };
+            (quantity.key, value)
+        });
         object(fields.chain(self.problem.as_deref().map(|problem| ("error", quoted(problem)))))
     }
 

@@ -10,9 +10,8 @@ use files::FileArgs;
 use integrate::integrate;
 use lnn::lagrangian::{EulerLagrange, LeastNorm};
 use lnn::names::pluralize;
-use lnn::report::{MotionSummary, MotionTexts};
+use lnn::report::MotionSummary;
 use lnn::rollout::Event;
-use lnn::symmetry::Invariant;
 use readings::ReadingColumns;
 use samples::{MoreColumns, Samples};
 use std::path::Path;
@@ -100,10 +99,7 @@ pub fn run(args: &Args) -> Result<(), CliError> {
     let (record, tube, kept) = samples.finish()?;
     let events = (!source.events.is_empty()).then(|| record.events(&ending.events));
     args.files.write_events(events.as_ref())?;
-    let (title, parameter) = (format!("{}: roll-out", source.name), source.parameter());
-    let energy = record.invariant(model).map_or("energy", Invariant::charge);
-    let texts = MotionTexts { title: &title, parameter: &parameter, energy, units: &source.units };
-    args.files.draw(&record, &texts, tube.as_ref())?;
+    args.files.draw(&record, (&source, model), tube.as_ref())?;
     if let Some(leaving) = record.leaving.as_ref().filter(|_| args.integration.beyond_range) {
         output::note(&format!("{}; the motion after that is extrapolated", leaving.text()));
     }

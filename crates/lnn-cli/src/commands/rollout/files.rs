@@ -2,11 +2,14 @@
 
 use crate::CliError;
 use crate::arguments::input::is_standard;
+use crate::arguments::motion_source::MotionSource;
 use crate::directories::files::{OutputFile, cannot_write, ends_in, file_ending, require_free};
 use crate::terminal::output;
 use lnn::analysis::MotionTube;
+use lnn::lagrangian::EulerLagrange;
 use lnn::report::{EventTable, MotionRecord, MotionTexts};
 use lnn::storage::write_atomically;
+use lnn::symmetry::Invariant;
 use std::path::{Path, PathBuf};
 
 /// Arguments.
@@ -66,10 +69,13 @@ impl FileArgs {
     pub fn draw(
         &self,
         record: &MotionRecord,
-        texts: &MotionTexts<'_>,
+        (source, model): (&MotionSource, &dyn EulerLagrange<f64>),
         tube: Option<&MotionTube>,
     ) -> Result<(), CliError> {
         let Some(file) = &self.plot else { return Ok(()) };
+        let (title, parameter) = (format!("{}: roll-out", source.name), source.parameter());
+        let energy = record.invariant(model).map_or("energy", Invariant::charge);
+        let texts = &MotionTexts { title: &title, parameter: &parameter, energy, units: &source.units };
         let is_page = ends_in(file, &EXTENSIONS[1..]);
         let drawn = if is_page { record.to_html(texts, tube) } else { record.to_svg(texts, tube) };
         write_atomically(file, drawn.map_err(CliError::data)?.as_bytes()).map_err(|e| cannot_write(file, e))
